@@ -1,0 +1,1 @@
+"""Circuits and subcircuits shipped with crescentlab, as YAML files."""

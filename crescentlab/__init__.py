@@ -1,0 +1,1 @@
+"""crescentlab: hydraulic circuits, written in YAML, become one global ODE."""

@@ -1,0 +1,213 @@
+"""Domains are power pairs; ports belong to a domain and have a role.
+
+On a net exactly one port *gives* the across variables (a volume gives p); all others *take* them
+and give back the through variable (an orifice gives q), positive **into** the component; the
+giver receives minus their sum. A port that *reads* looks at the across variables and gives nothing.
+A chamber net joins exactly two ports and its pressure returns unchanged. Signals have no through.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any, Literal
+
+from crescentlab import units
+from crescentlab.units import Quantity
+
+Role = Literal["gives", "takes", "reads", "undecided"]
+
+
+@dataclass(frozen=True)
+class Domain:
+    """A pair of across and through variables, each a name and a quantity."""
+
+    name: str
+    across: tuple[tuple[str, Quantity], ...]
+    through: tuple[tuple[str, Quantity], ...]
+    giver: str
+    """What to insert where nothing gives the across variable."""
+
+
+HYDRAULIC = Domain(
+    "hydraulic", (("p", units.pressure),), (("q", units.flow),), "a capacity, for example {type: capacity, volume: 10 cm^3}"
+)
+TRANSLATIONAL = Domain(
+    "translational", (("x", units.length), ("v", units.velocity)), (("f", units.force),),
+    "a mass, for example {type: mass_with_stops, mass: 20 g}",
+)  # fmt: skip
+ROTATIONAL = Domain(
+    "rotational", (("phi", units.angle), ("omega", units.speed)), (("torque", units.torque),),
+    "a shaft speed, for example {type: speed_source, speed: 2000 rpm}",
+)  # fmt: skip
+CHAMBER = Domain("chamber", (("V", units.volume), ("dV", units.flow)), (("p", units.pressure),), "a part that shapes a volume")
+SIGNAL = Domain("signal", (("", units.ratio),), (), "a source of the signal, for example {type: constant, value: 1}")
+
+Size = int | str | Callable[[Any], int]
+"""A number of elements: fixed, the name of an int field or property, or a function of the component."""
+
+
+class Declared:
+    """Something a component class declares under a name of its own."""
+
+    name: str = ""
+
+    def __set_name__(self, owner: type, name: str) -> None:
+        self.name = name
+
+
+@dataclass
+class Port(Declared):
+    """A place where a component meets a net; ``size`` makes it a vector."""
+
+    domain: Domain
+    role: Role
+    description: str
+    size: Size | None = None
+    quantity: Quantity | str | None = None
+    """Signals only: the quantity carried, or the name of the field that names it."""
+
+    def variables(self, kind: Literal["across", "through"]) -> list[tuple[str, Quantity | str]]:
+        """Names (as equations use them) and quantities of the port's variables of one kind."""
+        if self.domain is SIGNAL:
+            return [(self.name, self.quantity or units.ratio)] if kind == "across" else []
+        pairs = self.domain.across if kind == "across" else self.domain.through
+        return [(f"{variable}_{self.name}", quantity) for variable, quantity in pairs]
+
+    def inputs(self) -> list[tuple[str, Quantity | str]]:
+        """Variables the component may ask for at this port."""
+        return self.variables("through" if self.role == "gives" else "across")
+
+    def outputs(self) -> list[tuple[str, Quantity | str]]:
+        """Variables the component must return for this port."""
+        if self.role == "reads":
+            return []
+        return self.variables("across" if self.role == "gives" else "through")
+
+
+def gives_pressure(description: str, *, size: Size | None = None) -> Any:
+    """Hydraulic port that gives p [Pa, gauge] and receives q [m^3/s], positive into the component."""
+    return Port(HYDRAULIC, "gives", description, size)
+
+
+def takes_pressure(description: str, *, size: Size | None = None) -> Any:
+    """Hydraulic port that takes p and gives q, positive into the component."""
+    return Port(HYDRAULIC, "takes", description, size)
+
+
+def reads_pressure(description: str, *, size: Size | None = None) -> Any:
+    """Hydraulic port that reads p and passes no flow."""
+    return Port(HYDRAULIC, "reads", description, size)
+
+
+def undecided_pressure(description: str, *, size: Size | None = None) -> Any:
+    """Hydraulic port of a family: its forms say whether it gives or takes the pressure."""
+    return Port(HYDRAULIC, "undecided", description, size)
+
+
+def gives_motion(description: str, *, size: Size | None = None) -> Any:
+    """Translational port that gives x [m], v [m/s] and receives f [N], positive on the component."""
+    return Port(TRANSLATIONAL, "gives", description, size)
+
+
+def takes_motion(description: str, *, size: Size | None = None) -> Any:
+    """Translational port that takes x, v and gives f, positive on the component."""
+    return Port(TRANSLATIONAL, "takes", description, size)
+
+
+def reads_motion(description: str, *, size: Size | None = None) -> Any:
+    """Translational port that reads x, v and gives no force."""
+    return Port(TRANSLATIONAL, "reads", description, size)
+
+
+def gives_rotation(description: str, *, size: Size | None = None) -> Any:
+    """Rotational port that gives phi [rad], omega [rad/s] and receives torque [N m] on the component."""
+    return Port(ROTATIONAL, "gives", description, size)
+
+
+def takes_rotation(description: str, *, size: Size | None = None) -> Any:
+    """Rotational port that takes phi, omega and gives the torque on the component."""
+    return Port(ROTATIONAL, "takes", description, size)
+
+
+def reads_rotation(description: str, *, size: Size | None = None) -> Any:
+    """Rotational port that reads phi, omega and gives no torque."""
+    return Port(ROTATIONAL, "reads", description, size)
+
+
+def gives_chamber(description: str, *, size: Size | None = None) -> Any:
+    """Port that shapes a volume: gives V [m^3] > 0 and dV/dt [m^3/s], is answered by p [Pa]."""
+    return Port(CHAMBER, "gives", description, size)
+
+
+def takes_chamber(description: str, *, size: Size | None = None) -> Any:
+    """Port of the capacity that is shaped: takes V and dV/dt, answers with its p."""
+    return Port(CHAMBER, "takes", description, size)
+
+
+def gives_signal(quantity: Any, description: str, *, size: Size | None = None) -> Any:
+    """Signal output; ``quantity`` is a field type, or the name of a field that names a quantity."""
+    return Port(SIGNAL, "gives", description, size, quantity if isinstance(quantity, str) else units.quantity_of(quantity))
+
+
+def takes_signal(quantity: Any, description: str, *, size: Size | None = None) -> Any:
+    """Signal input; ``quantity`` is a field type, or the name of a field that names a quantity."""
+    return Port(SIGNAL, "takes", description, size, quantity if isinstance(quantity, str) else units.quantity_of(quantity))
+
+
+@dataclass
+class State(Declared):
+    """A continuous state: ``der_<name>`` must be returned."""
+
+    quantity: Quantity | str
+    description: str
+    start: float | str | Callable[[Any], Any] = 0.0
+    nominal: float | None = None
+    size: Size | None = None
+
+
+@dataclass
+class Held(Declared):
+    """A value that changes only at events."""
+
+    quantity: Quantity | str
+    description: str
+    start: float | str | Callable[[Any], Any] = 0.0
+    size: Size | None = None
+
+
+@dataclass
+class Observable(Declared):
+    """A returned value that a result can show; ``stored`` marks a component's fluid content."""
+
+    quantity: Quantity | str
+    description: str
+    size: Size | None = None
+    stored: bool = False
+
+
+def _named(quantity: Any) -> Quantity | str:
+    return quantity if isinstance(quantity, str) else units.quantity_of(quantity)
+
+
+def state(
+    quantity: Any, description: str, *, start: float | str | Callable[[Any], Any] = 0.0, nominal: float | None = None,
+    size: Size | None = None,
+) -> Any:  # fmt: skip
+    """A continuous state. ``start`` is SI, a field's name or a function; ``nominal`` sets its tolerance."""
+    return State(_named(quantity), description, start, nominal, size)
+
+
+def held(quantity: Any, description: str, *, start: float | str | Callable[[Any], Any] = 0.0, size: Size | None = None) -> Any:
+    """A held value, changed only by ``when`` and ``every``."""
+    return Held(_named(quantity), description, start, size)
+
+
+def observable(quantity: Any, description: str, *, size: Size | None = None) -> Any:
+    """A value worth showing that is neither a port variable nor a state."""
+    return Observable(_named(quantity), description, size)
+
+
+def stores(description: str = "fluid content, as volume at 0 bar gauge") -> Any:
+    """The observable [m^3] whose rate equals the sum of the component's hydraulic flows (its balance)."""
+    return Observable(units.volume, description, None, stored=True)

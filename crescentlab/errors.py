@@ -1,0 +1,87 @@
+"""Every error crescentlab raises on purpose, and what each one means.
+
+.. code-block:: text
+
+    CrescentlabError
+    +-- InputError          the user's text is wrong            exit code 2
+    |   +-- UnitError       a unit is unknown, missing or of another quantity
+    |   +-- ExpressionError an expression is not arithmetic, or its dimensions clash
+    |   +-- CausalityError  the nets cannot be given an order of evaluation
+    +-- ComponentError      a component class breaks its contract (its author's mistake)
+    +-- SimulationError     the run itself failed               exit code 3
+
+An :class:`InputError` carries the place it speaks of, so that its text begins ``FILE:LINE: ``.
+A :class:`ComponentError` found while a circuit is read is reported as the user's input too,
+for the user wrote the class.
+"""
+
+from __future__ import annotations
+
+import difflib
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True)
+class Place:
+    """Where in the user's text something stands: a file and a line counted from 1."""
+
+    file: str
+    line: int
+
+    def __str__(self) -> str:
+        return f"{self.file}:{self.line}"
+
+
+class CrescentlabError(Exception):
+    """Base of every error raised on purpose."""
+
+
+class InputError(CrescentlabError):
+    """The user's circuit, option or table is wrong; the text says what to write instead."""
+
+    def __init__(self, message: str, place: Place | None = None) -> None:
+        super().__init__(message)
+        self.message = message
+        self.place = place
+
+    def at(self, place: Place | None) -> InputError:
+        """Give the error a place, unless it already knows a more exact one."""
+        if self.place is None:
+            self.place = place
+        return self
+
+    def __str__(self) -> str:
+        return f"{self.place}: {self.message}" if self.place else self.message
+
+
+class UnitError(InputError):
+    """A number's unit is missing, unknown, or belongs to another quantity."""
+
+
+class ExpressionError(InputError):
+    """An expression is not arithmetic, names something unknown, or mixes dimensions."""
+
+
+class CausalityError(InputError):
+    """The nets cannot be evaluated: no giver, two givers, or an algebraic loop."""
+
+
+class ComponentError(CrescentlabError):
+    """A component class breaks the contract of :class:`crescentlab.component.Component`."""
+
+
+class SimulationError(CrescentlabError):
+    """The integration cannot go on; what was computed so far is kept by the caller."""
+
+
+def nearest(name: str, known: Iterable[str], *, limit: int = 3) -> str:
+    """The sentence that offers names like the one received, or lists what exists."""
+    names = sorted(set(known))
+    close = difflib.get_close_matches(name, names, n=limit, cutoff=0.5)
+    if close:
+        return f"did you mean {' or '.join(close)}?"
+    if not names:
+        return "there are none"
+    shown = ", ".join(names[:12])
+    return f"known: {shown}{', ...' if len(names) > 12 else ''}"

@@ -1,0 +1,177 @@
+"""The functions allowed in equations. Each works on floats, numpy arrays and symbols alike.
+
+``where`` chooses between two values and makes no event, so its branches must meet or its
+condition be held; ``event_where`` chooses by a condition that is frozen between events, so its
+branches may differ. ``when`` and ``every`` describe remaps of states and held values. Both branches
+of a choice are always evaluated *and differentiated*: keep square roots finite inside the branch.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from contextvars import ContextVar
+from dataclasses import dataclass
+from typing import Any, Protocol, TypeAlias
+
+import casadi as ca
+import numpy as np
+
+from crescentlab.symbols import Condition, Relation, Sym, as_condition, broadcast, concatenate
+
+Expr: TypeAlias = Sym
+"""What an equation works on: a symbol while tracing, a float or an array in a test."""
+
+Number: TypeAlias = Sym | float
+
+pi = float(np.pi)
+
+
+class Tracer(Protocol):
+    """Collects relations while a component is traced."""
+
+    def bit(self, relation: Relation) -> ca.SX:
+        """The frozen bit (0 or 1) that stands for ``relation``."""
+        ...
+
+
+TRACER: ContextVar[Tracer | None] = ContextVar("crescentlab_tracer", default=None)
+
+
+@dataclass(frozen=True)
+class Event:
+    """Remap of states and held values, done when ``condition`` turns from false to true."""
+
+    condition: Any
+    then: dict[str, Any]
+
+
+@dataclass(frozen=True)
+class Tick:
+    """Remap done at t0 + k dt, k = 1, 2, ..."""
+
+    dt: Any
+    then: dict[str, Any]
+
+
+def when(condition: Any, **then: Any) -> Event:
+    """Set the named states and held values each time ``condition`` becomes true."""
+    return Event(condition, then)
+
+
+def every(dt: Any, **then: Any) -> Tick:
+    """Set the named states and held values every ``dt`` [s]; dt depends on parameters only."""
+    return Tick(dt, then)
+
+
+def _elementwise(symbolic: Callable[[ca.SX], ca.SX], numeric: Callable[[Any], Any], doc: str) -> Callable[[Any], Any]:
+    def function(x: Any) -> Any:
+        return x.map(symbolic) if isinstance(x, Sym) else numeric(x)
+
+    function.__doc__ = doc
+    return function
+
+
+sqrt = _elementwise(ca.sqrt, np.sqrt, "Square root; its slope at 0 is infinite, so regularise the argument.")
+exp = _elementwise(ca.exp, np.exp, "Exponential.")
+log = _elementwise(ca.log, np.log, "Natural logarithm.")
+sin = _elementwise(ca.sin, np.sin, "Sine of an angle [rad].")
+cos = _elementwise(ca.cos, np.cos, "Cosine of an angle [rad].")
+tan = _elementwise(ca.tan, np.tan, "Tangent of an angle [rad].")
+asin = _elementwise(ca.asin, np.arcsin, "Arc sine [rad].")
+acos = _elementwise(ca.acos, np.arccos, "Arc cosine [rad].")
+atan = _elementwise(ca.atan, np.arctan, "Arc tangent [rad].")
+tanh = _elementwise(ca.tanh, np.tanh, "Hyperbolic tangent.")
+sinh = _elementwise(ca.sinh, np.sinh, "Hyperbolic sine.")
+cosh = _elementwise(ca.cosh, np.cosh, "Hyperbolic cosine.")
+fabs = _elementwise(ca.fabs, np.abs, "Absolute value.")
+sign = _elementwise(ca.sign, np.sign, "-1, 0 or 1; jumps without an event.")
+
+
+def _pairwise(symbolic: Callable[[ca.SX, ca.SX], ca.SX], numeric: Callable[[Any, Any], Any], doc: str) -> Callable[[Any, Any], Any]:
+    def function(a: Any, b: Any) -> Any:
+        if isinstance(a, Sym) or isinstance(b, Sym):
+            return Sym.of(a)._zip(b, symbolic)
+        return numeric(a, b)
+
+    function.__doc__ = doc
+    return function
+
+
+minimum = _pairwise(ca.fmin, np.minimum, "The smaller of two values.")
+maximum = _pairwise(ca.fmax, np.maximum, "The larger of two values.")
+atan2 = _pairwise(ca.atan2, np.arctan2, "Angle of the point (b, a) [rad].")
+hypot = _pairwise(lambda a, b: ca.sqrt(a * a + b * b), np.hypot, "Square root of the sum of squares.")
+fmod = _pairwise(ca.fmod, np.fmod, "Remainder with the sign of the first; for constants, never for a running angle.")
+
+
+def not_(condition: Any) -> Any:
+    """The opposite truth value (``~True`` is -2 on a plain bool)."""
+    return ~condition if isinstance(condition, Condition) else np.logical_not(condition)[()]
+
+
+def _symbolic(*values: Any) -> bool:
+    return any(
+        isinstance(v, (Sym, Condition)) or (isinstance(v, (list, tuple)) and _symbolic(*v)) for v in values
+    )
+
+
+def where(condition: Any, a: Any, b: Any) -> Any:
+    """``a`` where the condition holds, else ``b``, decided anew at every evaluation (no event)."""
+    if not _symbolic(condition, a, b):
+        return np.where(condition, a, b)[()]
+    return _choose(as_condition(condition), None, a, b)
+
+
+def event_where(condition: Any, a: Any, b: Any) -> Any:
+    """``a`` where the condition holds, else ``b``; the choice is frozen between events."""
+    if not _symbolic(condition):
+        return where(condition, a, b)
+    tracer = TRACER.get()
+    if tracer is None:
+        raise TypeError("event_where works on symbols only inside a component's equations")
+    return _choose(as_condition(condition), tracer.bit, a, b)
+
+
+def _choose(condition: Condition, bit: Callable[[Relation], ca.SX] | None, a: Any, b: Any) -> Sym:
+    yes, no = Sym.of(a), Sym.of(b)
+    shape = broadcast(broadcast(condition.shape, yes.shape), no.shape)
+    if shape == (0,):
+        return Sym(ca.SX(0, 1), shape)
+    return Sym(ca.if_else(condition.lower(bit), yes.sx, no.sx), shape)
+
+
+def stack(*values: Any) -> Any:
+    """Scalars and vectors, one after another, as one vector."""
+    if _symbolic(*values):
+        return concatenate([Sym.of(v) for v in values])
+    return np.concatenate([np.atleast_1d(np.asarray(v, dtype=float)) for v in values])
+
+
+def total(vector: Any) -> Any:
+    """Sum of a vector's elements; 0 for an empty one."""
+    if isinstance(vector, Sym):
+        return Sym(ca.sum1(vector.sx)) if vector.shape not in ((), (0,)) else (vector if vector.shape == () else Sym.of(0.0))
+    return float(np.sum(vector))
+
+
+def ones(n: int) -> np.ndarray:
+    """A vector of n ones."""
+    return np.ones(n)
+
+
+def table(x: Any, knots: Sequence[float], values: Sequence[float], *, flag_knots: bool = True) -> Any:
+    """Piecewise linear y(x) through the points, continued with the end slopes.
+
+    ``knots`` strictly increasing, at least two. While tracing, each inner knot is an event, for a
+    kink inside a step would limit every solver's accuracy; ``flag_knots=False`` leaves them out.
+    """
+    xs, ys = np.asarray(knots, dtype=float), np.asarray(values, dtype=float)
+    slopes = np.diff(ys) / np.diff(xs)
+    if not isinstance(x, Sym):
+        piece = np.clip(np.searchsorted(xs, x, side="right") - 1, 0, len(slopes) - 1)
+        return (ys[piece] + slopes[piece] * (np.asarray(x) - xs[piece]))[()]
+    choose = event_where if flag_knots and TRACER.get() is not None else where
+    y: Any = ys[0] + slopes[0] * (x - xs[0])
+    for k in range(1, len(slopes)):
+        y = choose(x > xs[k], ys[k] + slopes[k] * (x - xs[k]), y)
+    return y

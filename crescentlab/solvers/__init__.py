@@ -1,0 +1,1 @@
+"""System -> Trajectory: one event loop over SciPy's steppers."""
