@@ -38,7 +38,7 @@ from pydantic.fields import FieldInfo
 from crescentlab import units
 from crescentlab.domain import HYDRAULIC, Declared, Held, Observable, Port, Size, State
 from crescentlab.errors import ComponentError, nearest
-from crescentlab.maths import Event, Tick
+from crescentlab.maths import Event, Failure, Tick
 from crescentlab.units import Quantity
 
 Equations: TypeAlias = dict[str, Any]
@@ -105,6 +105,8 @@ class Component(BaseModel):
         if size is None:
             return None
         value = getattr(self, size) if isinstance(size, str) else size(self) if callable(size) else size
+        if value is None:
+            return None
         if int(value) != value or value < 0:
             raise ComponentError(f"{type(self).__name__}: size {value!r} is not a whole number from 0")
         return int(value)
@@ -234,6 +236,8 @@ def check_returned(cls: type[Component], returned: Any) -> None:
     if missing:
         raise ComponentError(f"{where}: equations does not return {', '.join(sorted(missing))}")
     for name, value in returned.items():
+        if isinstance(value, Failure):
+            continue
         if isinstance(value, (Event, Tick)):
             allowed = {s.name for s in [*cls.declared(State), *cls.declared(Held)]}
             unknown = set(value.then) - allowed

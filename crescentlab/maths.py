@@ -53,6 +53,14 @@ class Tick:
     then: dict[str, Any]
 
 
+@dataclass(frozen=True)
+class Failure:
+    """The run ends in an error once ``condition`` turns true."""
+
+    condition: Any
+    message: str
+
+
 def when(condition: Any, **then: Any) -> Event:
     """Set the named states and held values each time ``condition`` becomes true."""
     return Event(condition, then)
@@ -61,6 +69,14 @@ def when(condition: Any, **then: Any) -> Event:
 def every(dt: Any, **then: Any) -> Tick:
     """Set the named states and held values every ``dt`` [s]; dt depends on parameters only."""
     return Tick(dt, then)
+
+
+def fail_when(condition: Any, message: str) -> Failure:
+    """End the run when ``condition`` becomes true; ``{name}`` in the message shows a value.
+
+    The names are observables and parameters of the component.
+    """
+    return Failure(condition, message)
 
 
 def _elementwise(symbolic: Callable[[ca.SX], ca.SX], numeric: Callable[[Any], Any], doc: str) -> Callable[[Any], Any]:

@@ -1,0 +1,450 @@
+"""Netlist + library -> :class:`Design`: every component an instance with SI numbers, subcircuits flat.
+
+Expressions are evaluated here, so that a change of a parameter gives new numbers for the same
+structure. Names of what lies inside a subcircuit begin with the subcircuit's: ``valve.spool``.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from crescentlab.component import Component, field_quantity, is_structural
+from crescentlab.domain import Held, Port, State
+from crescentlab.errors import ExpressionError, InputError, Place, UnitError, nearest
+from crescentlab.expressions import Value, evaluate, is_expression
+from crescentlab.fluid import Fluid
+from crescentlab.library import Library
+from crescentlab.netlist import Netlist, NetSection, net_ports, validated
+from crescentlab.units import QUANTITIES, is_number, parse_any
+from crescentlab.yaml_text import Node
+
+MAX_SUBCIRCUIT_DEPTH = 20
+COMMAND = Place("--set", 0)
+
+
+@dataclass(frozen=True)
+class Instance:
+    """One component of the flat circuit: validated, with start values the user gave (SI)."""
+
+    name: str
+    component: Component
+    place: Place | None
+    start: dict[str, np.ndarray] = field(default_factory=dict)
+
+
+@dataclass(frozen=True, eq=False)
+class PortRef:
+    """A port of an instance, one element of it (from 1), or all its elements on one net (``"*"``)."""
+
+    instance: str
+    port: Port
+    element: int | str | None
+    place: Place | None
+
+    def __str__(self) -> str:
+        return f"{self.instance}.{self.port.name}" + (f"[{self.element}]" if self.element is not None else "")
+
+
+@dataclass
+class DesignNet:
+    """Ports joined together; ``aliases`` are its names inside subcircuits."""
+
+    name: str
+    place: Place | None
+    ports: list[PortRef] = field(default_factory=list)
+    fluid: str | None = None
+    aliases: list[str] = field(default_factory=list)
+    open: bool = False
+
+
+@dataclass(frozen=True)
+class Output:
+    """A named expression over variables, seen from the scope (``valve.``) it was written in."""
+
+    name: str
+    text: str
+    scope: str
+    place: Place | None
+
+
+@dataclass(frozen=True)
+class Design:
+    """The flat circuit with numbers: what the graph is made of."""
+
+    netlist: Netlist
+    instances: dict[str, Instance]
+    nets: list[DesignNet]
+    fluids: dict[str, Fluid]
+    outputs: list[Output]
+    parameters: dict[str, dict[str, Value]]
+    """Parameter values per scope ('' is the circuit's own)."""
+
+
+def elaborate(netlist: Netlist, library: Library, settings: Mapping[str, str] | None = None, *, no_code: bool = False) -> Design:
+    """Flatten ``netlist``; ``settings`` are ``--set`` texts by dotted name.
+
+    Raises :class:`InputError` with file and line for whatever in the files, or ``--set`` for whatever
+    in the settings, cannot be used.
+    """
+    work = _Elaboration(no_code)
+    overrides = _Overrides(dict(settings or {}))
+    library = work.with_user_files(netlist, library)
+    fluids = work.fluids(netlist, library, overrides)
+    work.scope(netlist, library, "", {}, overrides, (netlist.folder / netlist.name,))
+    overrides.check_used()
+    return Design(netlist, work.instances, work.joined_nets(), fluids, work.outputs, work.parameters)
+
+
+class _Overrides:
+    """Texts given by ``--set``; each must be used by something."""
+
+    def __init__(self, texts: dict[str, str]) -> None:
+        self.texts = texts
+        self.used: set[str] = set()
+        self.known: set[str] = set()
+
+    def take(self, name: str) -> str | None:
+        self.known.add(name)
+        if name in self.texts:
+            self.used.add(name)
+            return self.texts[name]
+        return None
+
+    def check_used(self) -> None:
+        for name in self.texts:
+            if name not in self.used:
+                raise InputError(f"--set {name}: nothing has this name: {nearest(name, self.known)}")
+
+
+class _Elaboration:
+    """Collects the flat circuit while walking subcircuits."""
+
+    def __init__(self, no_code: bool) -> None:
+        self.no_code = no_code
+        self.instances: dict[str, Instance] = {}
+        self.nets: dict[str, DesignNet] = {}
+        self.joins: list[tuple[str, str]] = []  # outer net, inner net
+        self.outputs: list[Output] = []
+        self.parameters: dict[str, dict[str, Value]] = {}
+        self.parts: dict[str, Netlist] = {}
+
+    def with_user_files(self, netlist: Netlist, library: Library) -> Library:
+        for k, text in enumerate(netlist.sections.library):
+            place = netlist.place("library", k)
+            if self.no_code:
+                raise InputError(f"{text} would run Python code, which --no-code refuses", place)
+            library = library.extended(netlist.folder / text, place)
+        return library
+
+    # -- numbers ---------------------------------------------------------------------------------
+
+    def fluids(self, netlist: Netlist, library: Library, overrides: _Overrides) -> dict[str, Fluid]:
+        values = _parameter_values(netlist, {}, overrides, "")
+        made: dict[str, Fluid] = {}
+        given = netlist.sections.fluids or ({"fluid": netlist.sections.fluid} if netlist.sections.fluid else {})
+        for name in given:
+            path = ("fluids", name) if netlist.sections.fluids else ("fluid",)
+            node = netlist.node.find(path)
+            assert isinstance(node.value, dict)
+            if "type" not in node.value:
+                raise InputError("the fluid needs a type, for example fluid: {type: simple_oil}", node.place)
+            cls = library.fluid(str(node.value["type"].value), node.place_of("type"))
+            made[name] = _instance(cls, node, _scope_lookup(values, netlist), overrides, name, netlist.folder, {"type"}, name)
+        return made
+
+    def scope(
+        self, netlist: Netlist, library: Library, prefix: str, passed: Mapping[str, Value], overrides: _Overrides, chain: tuple[Path, ...]
+    ) -> None:
+        """Add one circuit's components, nets and outputs under ``prefix`` ('' or 'valve.')."""
+        sections = netlist.sections
+        values = _parameter_values(netlist, passed, overrides, prefix)
+        self.parameters[prefix] = values
+        inner_ports: dict[str, dict[str, str]] = {}
+        for name, section in sections.components.items():
+            node = netlist.node.find(("components", name))
+            full = prefix + name
+            if section.type.endswith((".yaml", ".yml")):
+                inner_ports[name] = self.subcircuit(netlist, section.type, node, full, values, library, overrides, chain)
+            else:
+                self.component(netlist, library.component(section.type, node.place_of("type")), node, full, values, overrides)
+        for name, net in sections.nets.items():
+            self.net(netlist, prefix, name, net, inner_ports)
+        for name in sections.outputs:
+            place = netlist.place("outputs", name)
+            if not is_expression(sections.outputs[name]):
+                raise InputError(f"output {name!r} must be an expression, for example {name}: '= line.p * valve.q'", place)
+            self.outputs.append(Output(prefix + name, sections.outputs[name], prefix, place))
+
+    def component(
+        self, netlist: Netlist, cls: type[Component], node: Node, full: str, values: dict[str, Value], overrides: _Overrides
+    ) -> None:
+        lookup = _scope_lookup(values, netlist)
+        instance = _instance(cls, node, lookup, overrides, full, netlist.folder, {"type", "start"}, full)
+        stateful = {s.name: s for form in cls.forms() for s in form.declared(State) + form.declared(Held)}
+        start: dict[str, np.ndarray] = {}
+        given = node.value["start"].value if isinstance(node.value, dict) and "start" in node.value else {}
+        if not isinstance(given, dict):
+            raise InputError(f"{full}: start needs keys, for example start: {{p: 1 bar}}", node.place_of("start"))
+        for name in given:
+            if name not in stateful:
+                raise InputError(f"{full}: no state {name!r} to start: {nearest(name, stateful)}", node.place_of("start", name))
+        for name, declared in stateful.items():
+            text = overrides.take(f"{full}.start.{name}")
+            source = Node(text, COMMAND) if text is not None else given.get(name)
+            if source is not None:
+                quantity = instance.quantity(declared.quantity)
+                items = source.value if isinstance(source.value, list) else [source]
+                start[name] = np.array([_number(str(i.value), quantity, lookup, f"{full}.start.{name}", i.place) for i in items])
+        self.instances[full] = Instance(full, instance, node.place, start)
+
+    def subcircuit(
+        self, netlist: Netlist, file: str, node: Node, full: str, values: dict[str, Value], library: Library, overrides: _Overrides,
+        chain: tuple[Path, ...],
+    ) -> dict[str, str]:  # fmt: skip
+        """Elaborate a subcircuit file; return which inner net each of its ports is."""
+        place = node.place_of("type")
+        path = netlist.folder / file
+        key = path.resolve().with_suffix("")
+        if key in [c.resolve() for c in chain]:
+            names = " -> ".join([c.name for c in (*chain, key)])
+            raise InputError(f"subcircuits contain each other: {names}; remove one of these", place)
+        if len(chain) > MAX_SUBCIRCUIT_DEPTH:
+            raise InputError(f"subcircuits nested deeper than {MAX_SUBCIRCUIT_DEPTH}", place)
+        if not path.is_file():
+            raise InputError(f"the subcircuit {file} does not exist; it is looked for beside {netlist.name}", place)
+        part = self.parts.setdefault(str(key), Netlist.read(path))
+        if not part.sections.ports:
+            raise InputError(f"{file} has no ports: and cannot be used as a subcircuit", place)
+        assert isinstance(node.value, dict)
+        lookup = _scope_lookup(values, netlist)
+        passed: dict[str, Value] = {}
+        for name, child in node.value.items():
+            if name in ("type", "start"):
+                continue
+            if name not in part.sections.parameters:
+                raise InputError(f"{full}: {file} has no parameter {name!r}: {nearest(name, part.sections.parameters)}", node.place_of(name))
+            passed[name] = _value(str(child.value), lookup, f"{full}.{name}", child.place)
+        _check_passed(part, passed, node, full)
+        self.scope(part, self.with_user_files(part, library), full + ".", passed, overrides, (*chain, key))
+        for port, net in part.sections.ports.items():
+            if net not in part.sections.nets:
+                raise InputError(f"port {port!r} names the net {net!r}, which does not exist: {nearest(net, part.sections.nets)}", part.place("ports", port))
+        return {port: f"{full}.{net}" for port, net in part.sections.ports.items()}
+
+    # -- nets ------------------------------------------------------------------------------------
+
+    def net(self, netlist: Netlist, prefix: str, name: str, section: list[str] | NetSection, inner_ports: dict[str, dict[str, str]]) -> None:
+        base = ("nets", name, "ports") if isinstance(section, NetSection) else ("nets", name)
+        net = DesignNet(prefix + name, netlist.place("nets", name))
+        net.open = name in netlist.sections.ports.values() and prefix == ""
+        if isinstance(section, NetSection):
+            net.fluid = section.fluid
+        self.nets[net.name] = net
+        for k, text in enumerate(net_ports(section)):
+            place = netlist.place(*base, k) or net.place
+            match = re.fullmatch(r"([\w.]+)\.(\w+)(?:\[(\d+|\*)\])?", text.strip())
+            if not match:
+                raise InputError(f"net {name}: {text!r} is not a port; write component.port, component.port[2] or component.port[*]", place)
+            owner, port_name, index = match[1], match[2], match[3]
+            if owner in inner_ports:
+                ports = inner_ports[owner]
+                if port_name not in ports:
+                    raise InputError(f"net {name}: subcircuit {owner!r} has no port {port_name!r}: {nearest(port_name, ports)}", place)
+                self.joins.append((net.name, ports[port_name]))
+                continue
+            instance = self.instances.get(prefix + owner)
+            if instance is None or owner not in netlist.sections.components:
+                raise InputError(f"net {name}: no component {owner!r}: {nearest(owner, netlist.sections.components)}", place)
+            known = {p.name: p for p in type(instance.component).ports()}
+            if port_name not in known:
+                raise InputError(f"net {name}: {owner!r} has no port {port_name!r}: {nearest(port_name, known)}", place)
+            element = index if index in (None, "*") else int(index)
+            net.ports.append(PortRef(instance.name, known[port_name], element, place))
+
+    def joined_nets(self) -> list[DesignNet]:
+        """Nets with those of subcircuits merged into the outermost net they meet."""
+        parent = {name: name for name in self.nets}
+
+        def root(name: str) -> str:
+            while parent[name] != name:
+                parent[name] = parent[parent[name]]
+                name = parent[name]
+            return name
+
+        for outer, inner in self.joins:
+            a, b = root(outer), root(inner)
+            if a != b:
+                keep, drop = sorted((a, b), key=lambda n: (n.count("."), list(self.nets).index(n)))
+                parent[drop] = keep
+        for name, net in self.nets.items():
+            keep = self.nets[root(name)]
+            if keep is not net:
+                keep.ports += net.ports
+                keep.aliases.append(name)
+                keep.fluid = keep.fluid or net.fluid
+                keep.open = keep.open or net.open
+        return [net for name, net in self.nets.items() if root(name) == name]
+
+
+def _check_passed(part: Netlist, passed: dict[str, Value], node: Node, full: str) -> None:
+    """A value passed into a part must be of the kind of the part's own default."""
+    for name, value in passed.items():
+        default = part.sections.parameters[name]
+        if is_expression(default) or not is_number(default):
+            continue
+        try:
+            _, quantity = parse_any(default)
+        except UnitError:
+            continue
+        if isinstance(value.value, str) or value.dims != quantity.dims:
+            raise InputError(f"{full}.{name}: this must be a {quantity.title}; write for example {name}: {quantity.example()}", node.place_of(name))
+
+
+def _parameter_values(netlist: Netlist, passed: Mapping[str, Value], overrides: _Overrides, prefix: str) -> dict[str, Value]:
+    """Values of a scope's parameters, in any order of writing; a circle is an error."""
+    texts = netlist.sections.parameters
+    values: dict[str, Value] = {}
+    running: list[str] = []
+
+    def find(name: str) -> Value:
+        if name not in texts:
+            raise ExpressionError(f"unknown name {name!r}: {nearest(name, texts)}")
+        if name not in values:
+            if name in running:
+                raise ExpressionError(f"parameters depend on each other: {' -> '.join([*running, name])}")
+            running.append(name)
+            place = netlist.place("parameters", name)
+            text = overrides.take(prefix + name)
+            if text is not None:
+                values[name] = _value(text, find, f"--set {prefix}{name}", COMMAND)
+                _same_kind(values[name], texts[name], f"--set {prefix}{name}")
+            elif name in passed:
+                values[name] = passed[name]
+            else:
+                values[name] = _value(texts[name], find, name, place)
+            running.pop()
+        return values[name]
+
+    for name in texts:
+        find(name)
+    return values
+
+
+def _same_kind(value: Value, default: str, subject: str) -> None:
+    if is_expression(default) or not is_number(default):
+        return
+    try:
+        _, quantity = parse_any(default)
+    except UnitError:
+        return
+    if isinstance(value.value, str) or value.dims != quantity.dims:
+        raise InputError(f"{subject}: this must be a {quantity.title}; write for example {quantity.example()}")
+
+
+def _scope_lookup(values: Mapping[str, Value], netlist: Netlist) -> Any:
+    def find(name: str) -> Value:
+        if name not in values:
+            raise ExpressionError(f"unknown name {name!r}: {nearest(name, values)}")
+        return values[name]
+
+    return find
+
+
+def _value(text: str, lookup: Any, subject: str, place: Place | None) -> Value:
+    """A parameter's text as a value: expression, number with unit, or word."""
+    try:
+        if is_expression(text):
+            return evaluate(text, lookup)
+        if is_number(text):
+            number, quantity = parse_any(text)
+            return Value(number, quantity)
+        return Value(text)
+    except InputError as error:
+        raise _described(error, subject, place) from None
+
+
+def _described(error: InputError, subject: str, place: Place | None) -> InputError:
+    if error.place is not None:
+        return error
+    message = f"{subject}: {error.message}" if not error.message.startswith(subject) else error.message
+    return type(error)(message, None if place is COMMAND else place)
+
+
+def _number(text: str, quantity: Any, lookup: Any, subject: str, place: Place | None) -> float:
+    try:
+        if is_expression(text):
+            value = evaluate(text, lookup)
+            if isinstance(value.value, str) or value.dims != quantity.dims:
+                raise ExpressionError(f"the expression gives {value.quantity.title} [{value.quantity.si}], not {quantity.title} [{quantity.si}]")
+            return float(value.value)
+        return float(quantity.parse(text))
+    except InputError as error:
+        raise _described(error, subject, place) from None
+
+
+def _instance(
+    cls: type[Any], node: Node, lookup: Any, overrides: _Overrides, full: str, folder: Path, skip: set[str], subject: str
+) -> Any:
+    """Validate a component or fluid; expressions become numbers first, ``--set`` texts replace."""
+    assert isinstance(node.value, dict)
+    data: dict[str, Any] = {}
+    given = {name: child for name, child in node.value.items() if name not in skip}
+    from_command: set[str] = set()
+    for name in cls.model_fields:
+        text = overrides.take(f"{full}.{name}")
+        if text is not None:
+            given[name] = Node(text, COMMAND)
+            from_command.add(name)
+    for name, child in given.items():
+        info = cls.model_fields.get(name)
+        where = f"--set {full}.{name}" if name in from_command else f"{subject}.{name}"
+        data[name] = _plain(child, info, lookup, where) if info is not None else child.plain()
+    try:
+        return validated(cls, node, data, context={"folder": str(folder)}, subject=subject)
+    except InputError as error:
+        hit = next((n for n in from_command if f"{subject}: {n}:" in error.message), None)
+        if hit:
+            raise type(error)(f"--set {full}.{hit}: {error.message.removeprefix(f'{subject}: {hit}: ')}") from None
+        raise
+
+
+def _plain(node: Node, info: Any, lookup: Any, subject: str) -> Any:
+    """A field's node as pydantic takes it: expressions evaluated and checked for dimension."""
+    if isinstance(node.value, list):
+        return [_plain(child, info, lookup, subject) for child in node.value]
+    if isinstance(node.value, dict):
+        return node.plain()
+    text = node.value
+    if not is_expression(text):
+        return _whole(text, info)
+    try:
+        value = evaluate(text, lookup)
+        quantity = field_quantity(info)
+        if isinstance(value.value, str):
+            return value.value
+        if quantity is None:
+            if value.dims != QUANTITIES["ratio"].dims:
+                raise ExpressionError(f"the expression gives {value.quantity.title} [{value.quantity.si}], where a plain number or word belongs")
+            number = float(value.value)
+            return int(number) if number.is_integer() else number
+        if value.dims != quantity.dims:
+            raise ExpressionError(f"the expression gives {value.quantity.title} [{value.quantity.si}], not {quantity.title} [{quantity.si}]")
+        return float(value.value)
+    except InputError as error:
+        raise _described(error, subject, node.place) from None
+
+
+def _whole(text: str, info: Any) -> Any:
+    """Whole numbers and true/false reach pydantic as such; everything else stays text."""
+    if is_structural(info) and field_quantity(info) is None:
+        if text in ("true", "false"):
+            return text == "true"
+        if text in ("null", "none", "~"):
+            return None
+    return text

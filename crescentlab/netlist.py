@@ -1,0 +1,248 @@
+"""YAML text -> :class:`Netlist`: the sections of a circuit file, checked for shape, with their places.
+
+A netlist knows nothing of component classes; what a component's keys mean is settled when the
+netlist is elaborated with a library.
+"""
+
+from __future__ import annotations
+
+import keyword
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Annotated, Any, Literal, TypeVar
+
+from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Field, ValidationError
+
+from crescentlab.component import field_quantity
+from crescentlab.errors import InputError, Place, nearest
+from crescentlab.units import QUANTITIES, Time, UnitError
+from crescentlab.yaml_text import Node, quoted, read
+
+
+
+def _no_keyword(name: str) -> str:
+    for word in name.split("."):
+        if keyword.iskeyword(word):
+            raise ValueError(f"{word!r} has a meaning of its own in expressions; choose another name")
+    return name
+
+
+Name = Annotated[str, Field(pattern=r"^[A-Za-z_]\w*$"), AfterValidator(_no_keyword)]
+OutputName = Annotated[str, Field(pattern=r"^[A-Za-z_]\w*(\.[A-Za-z_]\w*)?$"), AfterValidator(_no_keyword)]
+
+
+def _one_or_many(value: Any) -> Any:
+    return [value] if isinstance(value, str) else value
+
+
+class _Section(BaseModel):
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+
+class ComponentSection(BaseModel):
+    """One component: its type, start values, and parameters under their own names."""
+
+    model_config = ConfigDict(extra="allow", frozen=True)
+
+    type: str = Field(description="a component type, or the file of a subcircuit such as ./relief_valve_part.yaml")
+    start: dict[str, str | list[str]] = Field(default={}, description="start values of states: {p: 1 bar}")
+
+
+class NetSection(_Section):
+    """A net in its long form, for circuits of several fluids."""
+
+    fluid: str | None = Field(default=None, description="name of one of the circuit's fluids")
+    ports: list[str] = Field(description="component.port, component.port[2], component.port[*]")
+
+
+class SimulationSection(_Section):
+    """How long and how exactly to integrate."""
+
+    stop: Time = Field(default=1.0, gt=0, description="end time")
+    solver: Literal["auto", "lsoda", "bdf", "radau", "rk45", "dop853"] = Field(default="auto", description="integration method")
+    rtol: float = Field(default=1e-6, gt=0, lt=1, description="relative tolerance of every state")
+    max_step: Time | None = Field(default=None, gt=0, description="longest step; default from the circuit's own time scales")
+    output_step: Time | None = Field(default=None, gt=0, description="uniform output grid; default the accepted steps")
+    stop_when: str | None = Field(default=None, description="a condition that ends the run: line.p > 9 bar")
+
+
+class PlotSection(_Section):
+    """One picture: variables over time, or over another variable."""
+
+    y: Annotated[list[str], BeforeValidator(_one_or_many)] = Field(min_length=1, description="variables")
+    x: str | None = Field(default=None, description="variable of the horizontal axis; default time")
+    title: str | None = Field(default=None, description="title")
+    start: Time | None = Field(default=None, ge=0, description="first time shown")
+    stop: Time | None = Field(default=None, gt=0, description="last time shown")
+
+
+class CircuitFile(_Section):
+    """The sections of a circuit file."""
+
+    crescentlab: Literal["1"] = Field(description="format version")
+    title: str = Field(default="", description="one line")
+    description: str = Field(default="", description="what the circuit shows")
+    library: list[str] = Field(default=[], description="the user's own component files: [./my_components.py]")
+    fluid: dict[str, str] | None = Field(default=None, description="the one fluid: {type: simple_oil, ...}")
+    fluids: dict[Name, dict[str, str]] = Field(default={}, description="several fluids by name; nets choose")
+    parameters: dict[Name, str] = Field(default={}, description="numbers with units, words, or = expressions")
+    ports: dict[Name, str] = Field(default={}, description="of a subcircuit: port: net")
+    components: dict[Name, ComponentSection] = Field(default={}, description="name: {type: ..., parameter: value}")
+    nets: dict[Name, list[str] | NetSection] = Field(default={}, description="name: [component.port, ...]")
+    outputs: dict[OutputName, str] = Field(default={}, description="name: '= expression of variables'")
+    simulation: SimulationSection = Field(default=SimulationSection())
+    display: dict[str, str] = Field(default={}, description="units of summaries and plots: {pressure: bar}")
+    plots: list[PlotSection] = Field(default=[])
+
+
+@dataclass(frozen=True)
+class Netlist:
+    """A circuit file: its sections, the tree they came from, and the folder its files lie in."""
+
+    sections: CircuitFile
+    node: Node
+    name: str
+    folder: Path = field(default_factory=Path)
+
+    @staticmethod
+    def read(path: Path) -> Netlist:
+        """Read and check a circuit file."""
+        return Netlist.of_node(read(path), path.stem, path.parent)
+
+    @staticmethod
+    def of(data: Mapping[str, Any], name: str = "circuit", folder: Path | None = None) -> Netlist:
+        """A netlist from plain Python data shaped like a circuit file."""
+        return Netlist.of_node(Node.of(dict(data)), name, folder or Path())
+
+    @staticmethod
+    def of_node(node: Node, name: str, folder: Path) -> Netlist:
+        """Check the tree's shape; raises :class:`InputError` at the offending line."""
+        if not isinstance(node.value, dict):
+            raise InputError("a circuit file is a mapping that begins with `crescentlab: 1`", node.place)
+        if "crescentlab" not in node.value:
+            raise InputError("the format version is missing; begin the file with `crescentlab: 1`", node.place)
+        _collections(node)
+        sections = validated(CircuitFile, node)
+        if sections.fluid is not None and sections.fluids:
+            raise InputError("write either fluid: or fluids:, not both", node.place_of("fluids"))
+        if sections.ports and sections.simulation.stop_when:
+            raise InputError("a subcircuit cannot stop the run; move stop_when to the circuit", node.place_of("simulation", "stop_when"))
+        _namespace(sections, node)
+        _check_display(sections, node)
+        return Netlist(sections, node, name, folder)
+
+    def place(self, *path: Any) -> Place | None:
+        """Where something stands: ``place("components", "line", "volume")``."""
+        return self.node.place_of(*path)
+
+
+_KINDS: dict[str, tuple[type, str]] = {
+    "fluid": (dict, "{type: simple_oil, density: 860 kg/m^3}"), "fluids": (dict, "{oil: {type: simple_oil}}"),
+    "parameters": (dict, "{supply: 30 L/min}"), "components": (dict, "{tank: {type: tank}}"), "ports": (dict, "{inlet: p_line}"),
+    "nets": (dict, "{p_line: [pump.port, line.port]}"), "outputs": (dict, "{loss: '= line.p * valve.q'}"),
+    "simulation": (dict, "{stop: 50 ms}"), "display": (dict, "{pressure: bar}"),
+    "plots": (list, "[{y: [line.p]}]"), "library": (list, "[./my_components.py]"),
+}  # fmt: skip
+
+
+def _collections(node: Node) -> None:
+    """Refuse text where a section needs keys or items, and allow an empty section."""
+    assert isinstance(node.value, dict)
+    for key, (kind, example) in _KINDS.items():
+        child = node.value.get(key)
+        if child is not None and not isinstance(child.value, kind):
+            if child.value == "":
+                child.value = kind()
+                continue
+            raise InputError(f"{key}: needs {'keys' if kind is dict else 'a list'}, for example {key}: {example}", node.place_of(key))
+    components = node.value.get("components")
+    if components is not None and isinstance(components.value, dict):
+        for name, child in components.value.items():
+            if not isinstance(child.value, dict):
+                raise InputError(f"component {name!r} needs keys, for example {name}: {{type: orifice, area: 5 mm^2}}", components.place_of(name))
+
+
+def _namespace(sections: CircuitFile, node: Node) -> None:
+    for name in sections.nets:
+        if name in sections.components:
+            raise InputError(f"{name!r} names both a component and a net; rename one", node.place_of("nets", name))
+    for name in sections.parameters:
+        if name in sections.components or name in sections.nets:
+            raise InputError(f"{name!r} names a parameter and a component or net; rename one", node.place_of("parameters", name))
+
+
+def _check_display(sections: CircuitFile, node: Node) -> None:
+    for quantity, unit in sections.display.items():
+        place = node.place_of("display", quantity)
+        if quantity not in QUANTITIES:
+            raise InputError(f"display: unknown quantity {quantity!r}: {nearest(quantity, QUANTITIES)}", place)
+        try:
+            QUANTITIES[quantity].factor(unit)
+        except UnitError as error:
+            raise error.at(place) from None
+
+
+M = TypeVar("M", bound=BaseModel)
+
+
+def validated(model: type[M], node: Node, data: Any = None, *, context: Any = None, subject: str = "") -> M:
+    """``model`` from the node's text (or ``data``); the first error becomes one sentence at its line."""
+    try:
+        return model.model_validate(node.plain() if data is None else data, context=context)
+    except ValidationError as error:
+        raise explain(model, error, node, subject) from None
+
+
+def explain(model: type[BaseModel], error: ValidationError, node: Node, subject: str) -> InputError:
+    """Turn the first of pydantic's errors into a sentence that says where, what, and what to write."""
+    details = error.errors()[0]
+    path = [step for step in details["loc"] if step != "[key]"]
+    key = str(path[-1]) if path else ""
+    kind, said = details["type"], details["msg"]
+    place = node.place_of(*path) or node.place
+    where = f"{subject}: " if subject else ""
+    if kind == "extra_forbidden":
+        known = _fields_at(model, path[:-1])
+        return InputError(f"{where}unknown key {key!r}: {nearest(key, known)}", place)
+    if kind == "missing":
+        return InputError(f"{where}{key} is missing{_example(model, key)}", node.find(path[:-1]).place or node.place)
+    given = details.get("input")
+    value = f" {given!r}" if isinstance(given, (str, int, float)) else ""
+    if kind in ("unit", "curve", "value_error"):
+        said = said.removeprefix("Value error, ")
+        return InputError(f"{where}{key + ': ' if key else ''}{said}", place)
+    if kind == "string_pattern_mismatch":
+        return InputError(f"{where}{key!r} is not a name; use letters, digits and _, beginning with a letter", place)
+    if kind in ("float_parsing", "float_type") and isinstance(given, str):
+        return InputError(f"{where}{key}: {given!r} is not a number", place)
+    return InputError(f"{where}{key + ': ' if key else ''}{said[0].lower() + said[1:]}{', not' + value if value else ''}", place)
+
+
+def _fields_at(model: type[BaseModel], path: list[Any]) -> list[str]:
+    """Field names of the section at ``path``, for offering the nearest."""
+    if path and path[0] == "simulation":
+        return list(SimulationSection.model_fields)
+    if path and path[0] == "plots":
+        return list(PlotSection.model_fields)
+    if path and path[0] == "nets":
+        return list(NetSection.model_fields)
+    return list(model.model_fields)
+
+
+def _example(model: type[BaseModel], key: str) -> str:
+    field = model.model_fields.get(key)
+    quantity = field_quantity(field) if field is not None else None
+    if quantity is not None:
+        return f"; write for example {key}: {quantity.example()}"
+    return f"; write for example {key}: orifice" if key == "type" else ""
+
+
+def net_ports(section: list[str] | NetSection) -> list[str]:
+    """The ports a net lists, in either form."""
+    return section.ports if isinstance(section, NetSection) else section
+
+
+def corrected(text: str) -> str:
+    """A reference as it must be quoted inside brackets."""
+    return quoted(f"[{text}]")[1:-1]

@@ -1,0 +1,571 @@
+"""Plan -> :class:`System`: one global hybrid ODE as functions of one expression graph.
+
+.. math:: \\dot x = f(t, x, h, b, p), \\qquad g(t, x, h, b, p) \\gtrless 0
+
+x states, h held values, b frozen bits (one per relation), p parameters. The right-hand side, its
+exact sparse Jacobian, the relations with their time derivatives, the events' conditions and the
+remaps are CasADi functions; every other variable is an expression, made a function on demand.
+"""
+
+from __future__ import annotations
+
+import functools
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+import casadi as ca
+import numpy as np
+
+from crescentlab.causality import Plan, Source, _port
+from crescentlab.component import Component
+from crescentlab.domain import HYDRAULIC, SIGNAL, Held, Observable, State
+from crescentlab.elaborate import Design, Output
+from crescentlab.errors import ExpressionError, InputError, nearest
+from crescentlab.expressions import Value, evaluate
+from crescentlab.symbols import Condition, Relation, Sym
+from crescentlab.trace import Trace, numeric_fields, structure_of
+from crescentlab.units import Quantity
+
+Array = np.ndarray
+
+
+@dataclass(frozen=True)
+class Variable:
+    """A named value of the system: its expression(s), quantity, and whether it is a vector."""
+
+    name: str
+    quantity: Quantity
+    expression: Callable[[], list[ca.SX]]
+    vector: bool
+    listed: bool = True
+
+
+@dataclass(frozen=True)
+class SystemEvent:
+    """An event of the whole system by its full name: ``driver.closes``."""
+
+    name: str
+    kind: str
+    """``when``, ``every``, ``fail`` or ``stop``."""
+    message: str = ""
+    message_names: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
+class Bits:
+    """What is known of the relations without numbers."""
+
+    names: tuple[str, ...]
+    strict: Array
+    on_state: Array
+    on_time: Array
+    """Depends on t (and held values) but on no state."""
+    linear: Array
+    """Of those on time, the ones linear in t."""
+    held_dependent: Array
+
+
+@dataclass
+class Values:
+    """The numbers that go with a system: parameters, start values."""
+
+    p: Array
+    x0: Array
+    h0: Array
+    start_time: float = 0.0
+
+
+class Evaluator:
+    """A CasADi function called through its buffers, parameters fixed: about a microsecond a call."""
+
+    def __init__(self, function: ca.Function, p: Array) -> None:
+        self.function = function
+        self.buffer, self.trigger = function.buffer()
+        self.sizes = [function.nnz_in(k) for k in range(function.n_in())]
+        self.inputs = [np.zeros(max(n, 1)) for n in self.sizes]
+        self.outputs = [np.zeros(max(function.nnz_out(k), 1)) for k in range(function.n_out())]
+        self.results = [out[: function.nnz_out(k)] for k, out in enumerate(self.outputs)]
+        self.inputs[-1][: self.sizes[-1]] = p
+        for k, array in enumerate(self.inputs):
+            self.buffer.set_arg(k, memoryview(array))
+        for k, array in enumerate(self.outputs):
+            self.buffer.set_res(k, memoryview(array))
+
+    def __call__(self, *arguments: Any) -> list[Array]:
+        """Evaluate; the returned arrays are overwritten by the next call."""
+        for array, n, value in zip(self.inputs, self.sizes, arguments, strict=False):
+            array[:n] = value
+        self.trigger()
+        return self.results
+
+
+@dataclass(eq=False)
+class System:
+    """The assembled circuit; see the module docstring. Made by :func:`assemble`."""
+
+    plan: Plan
+    t: ca.SX
+    x: ca.SX
+    h: ca.SX
+    b: ca.SX
+    p: ca.SX
+    f: ca.SX
+    relations: ca.SX
+    scales: ca.SX
+    conditions: ca.SX
+    periods: ca.SX
+    clock: ca.SX
+    events: tuple[SystemEvent, ...]
+    state_names: list[str]
+    state_quantities: list[Quantity]
+    nominal: Array
+    held_names: list[str]
+    held_quantities: list[Quantity]
+    bits: Bits
+    variables: dict[str, Variable]
+    _remap: Callable[[], ca.Function]
+    _contents: dict[str, tuple[Callable[[], ca.SX], Callable[[], tuple[ca.SX, ca.SX]]]]
+    _functions: dict[Any, ca.Function] = field(default_factory=dict)
+
+    @property
+    def arguments(self) -> list[ca.SX]:
+        """Symbols every function of the system takes, in order."""
+        return [self.t, self.x, self.h, self.b, self.p]
+
+    @functools.cached_property
+    def rhs(self) -> ca.Function:
+        """f(t, x, h, b, p), shape (n,)."""
+        return ca.Function("f", self.arguments, [self.f])
+
+    @functools.cached_property
+    def jacobian_expression(self) -> ca.SX:
+        """df/dx, sparse (n, n)."""
+        return ca.jacobian(self.f, self.x)
+
+    @functools.cached_property
+    def jacobian(self) -> ca.Function:
+        """df/dx as a function; its nonzeros in column order."""
+        return ca.Function("dfdx", self.arguments, [self.jacobian_expression])
+
+    @functools.cached_property
+    def relation(self) -> ca.Function:
+        """Relations g, their time derivatives along f, and the magnitude of their sides."""
+        g = self.relations
+        rate = ca.jtimes(g, self.x, self.f) + ca.jacobian(g, self.t) if g.numel() else ca.SX(0, 1)
+        return ca.Function("g", self.arguments, [ca.densify(g), ca.densify(rate), ca.densify(self.scales)])
+
+    @functools.cached_property
+    def condition(self) -> ca.Function:
+        """Conditions of the events that have one, 0 or 1."""
+        return ca.Function("cond", self.arguments, [ca.densify(self.conditions)])
+
+    @functools.cached_property
+    def remap(self) -> ca.Function:
+        """(t, x, h, b, fired, p) -> new (x, h)."""
+        return self._remap()
+
+    @functools.cached_property
+    def period(self) -> ca.Function:
+        """Periods of the ticks, from p alone."""
+        return ca.Function("period", [self.p], [ca.densify(self.periods)])
+
+    def find(self, name: str) -> Variable:
+        """The variable called ``name``; raises :class:`InputError` offering the nearest."""
+        if name in self.variables:
+            return self.variables[name]
+        raise InputError(f"no variable {name!r}: {nearest(name, self.variables)}")
+
+    def function_of(self, names: Sequence[str]) -> ca.Function:
+        """A function giving the named variables' elements one after another."""
+        key = tuple(names)
+        if key not in self._functions:
+            column = [e for name in names for e in self.find(name).expression()]
+            self._functions[key] = ca.Function("v", self.arguments, [ca.densify(ca.vertcat(*column)) if column else ca.SX(0, 1)])
+        return self._functions[key]
+
+    def contents(self) -> dict[str, tuple[ca.SX, ca.SX, ca.SX]]:
+        """Per storing component: stored volume, sum of its flows, half the sum of their magnitudes."""
+        return {name: (content(), *flows()) for name, (content, flows) in self._contents.items()}
+
+    def values(self, design: Design) -> Values:
+        """Numbers for this structure; raises if ``design`` has another structure."""
+        p: list[float] = []
+        fluids = design.fluids
+        for fluid in fluids.values():
+            p += [float(getattr(fluid, n)) for n in numeric_fields(type(fluid), fluid)]
+        x0: list[Array] = []
+        h0: list[Array] = []
+        for name, shape in self.plan.components.items():
+            instance = design.instances[name]
+            component = instance.component
+            if type(shape) is not type(component):
+                component = type(shape).model_construct(**{n: getattr(component, n) for n in type(component).model_fields})
+            if structure_of(component) != structure_of(shape):
+                raise InputError(f"{name}: this value changes the structure; assemble the circuit anew", instance.place)
+            p += [float(getattr(component, n)) for n in self.plan.traces[name].parameters]
+            mine = [fluids[f] for f in self.plan.fluids[name]]
+            x0 += [_start(instance.start, s, component, mine, name, instance.place) for s in type(component).declared(State)]
+            h0 += [_start(instance.start, s, component, mine, name, instance.place) for s in type(component).declared(Held)]
+        return Values(np.array(p), _join(x0), _join(h0))
+
+
+def _start(given: dict[str, Array], declared: State | Held, component: Component, fluids: list[Any], name: str, place: Any) -> Array:
+    default = component.start_of(declared, fluids[0] if fluids else None)
+    if declared.name not in given:
+        return default
+    value = given[declared.name]
+    if value.size not in (1, default.size):
+        raise InputError(f"{name}: start of {declared.name} has {value.size} values for {default.size} elements", place)
+    return np.broadcast_to(value, default.shape)
+
+
+def _join(arrays: list[Array]) -> Array:
+    return np.concatenate(arrays) if arrays else np.zeros(0)
+
+
+def assemble(plan: Plan) -> System:
+    """Make the global ODE of a plan."""
+    return _Assembly(plan).done()
+
+
+class _Assembly:
+    """Calls every trace on the global symbols, in the plan's order."""
+
+    def __init__(self, plan: Plan) -> None:
+        self.plan = plan
+        traces = plan.traces
+        self.t = ca.SX.sym("t")
+        self.x, self.xs = _split("x", [tr.states.size for tr in traces.values()])
+        self.h, self.hs = _split("h", [tr.held.size for tr in traces.values()])
+        self.b_local, self.bs = _split("b", [len(tr.relations) for tr in traces.values()])
+        fluids = plan.design.fluids
+        counts = [len(numeric_fields(type(f), f)) for f in fluids.values()]
+        self.p, pieces = _split("p", counts + [len(tr.parameters) for tr in traces.values()])
+        fluid_pieces = dict(zip(fluids, pieces[: len(fluids)], strict=True))
+        self.arguments: dict[str, tuple[ca.SX, ...]] = {}
+        for name, xs, hs, bs, ps in zip(traces, self.xs, self.hs, self.bs, pieces[len(fluids) :], strict=True):
+            pf = ca.vertcat(*[fluid_pieces[f] for f in plan.fluids[name]]) if plan.fluids[name] else ca.SX(0, 1)
+            self.arguments[name] = (xs, hs, bs, ps, pf)
+        self.outputs: dict[str, list[ca.SX]] = {name: [ca.SX(0)] * tr.outputs.size for name, tr in traces.items()}
+        self.inputs: dict[str, ca.SX] = {}
+        self.observed: dict[str, ca.SX] = {}
+        self.resolved: set[str] = set()
+        self.running: list[str] = []
+        self.pending: dict[str, Output] = {}
+
+    def call(self, name: str, function: ca.Function, u: ca.SX) -> ca.SX:
+        xs, hs, bs, ps, pf = self.arguments[name]
+        return function(self.t, xs, hs, bs, u, ps, pf)
+
+    def value(self, source: Source) -> ca.SX:
+        if not source.outputs:
+            return ca.SX(0)
+        total = self.outputs[source.outputs[0][0]][source.outputs[0][1]]
+        for name, k in source.outputs[1:]:
+            total = total + self.outputs[name][k]
+        return total if source.sign == 1.0 else -total
+
+    def done(self) -> System:
+        plan = self.plan
+        for step in plan.order:
+            trace = plan.traces[step.instance]
+            group = trace.groups[step.group]
+            sources = plan.sources[step.instance]
+            needed = set(group.inputs)
+            u = [self.value(sources[i]) if i in needed else ca.SX(0) for i in range(trace.inputs.size)]
+            result = self.call(step.instance, group.function, _cat(u))
+            mine = self.outputs[step.instance]
+            for k, element in zip(group.outputs, ca.vertsplit(result), strict=True):
+                mine[k] = element
+        for name, trace in plan.traces.items():
+            self.inputs[name] = _cat([self.value(s) for s in plan.sources[name]])
+        derivative = _cat([self.call(n, tr.derivative, self.inputs[n]) for n, tr in plan.traces.items() if tr.states.size])
+        clock = _cat([self.call(n, tr.clock, self.inputs[n]) for n, tr in plan.traces.items() if tr.clock.numel_out(0)])
+        relations, scales = self.relations()
+        events, conditions, periods = self.events()
+        variables = self.variables()
+        extra = self.stop(variables, events, conditions, relations, scales)
+        b = ca.vertcat(self.b_local, extra)
+        g = _cat(relations)
+        return System(
+            plan, self.t, self.x, self.h, b, self.p, derivative, g, _cat(scales), _cat(conditions), _cat(periods), clock, tuple(events),
+            *self.names(State), self.nominal(), *self.names(Held), self.bits(g, b), variables,
+            functools.partial(self.remap, b), self.contents(),
+        )  # fmt: skip
+
+    def names(self, kind: type[State] | type[Held]) -> tuple[list[str], list[Quantity]]:
+        names: list[str] = []
+        quantities: list[Quantity] = []
+        for name, component in self.plan.components.items():
+            for declared in type(component).declared(kind):
+                n = component.size_of(declared.size)
+                names += [f"{name}.{declared.name}"] if n is None else [f"{name}.{declared.name}[{k + 1}]" for k in range(n)]
+                quantities += [component.quantity(declared.quantity)] * (1 if n is None else n)
+        return names, quantities
+
+    def nominal(self) -> Array:
+        found: list[float] = []
+        for component in self.plan.components.values():
+            for declared in type(component).declared(State):
+                n = component.size_of(declared.size)
+                usual = component.quantity(declared.quantity).nominal
+                found += [declared.nominal if declared.nominal is not None else usual] * (1 if n is None else n)
+        return np.array(found)
+
+    # -- events ----------------------------------------------------------------------------------
+
+    def relations(self) -> tuple[list[ca.SX], list[ca.SX]]:
+        g: list[ca.SX] = []
+        scale: list[ca.SX] = []
+        for name, trace in self.plan.traces.items():
+            if trace.relations:
+                both = self.call(name, trace.relation, self.inputs[name])
+                g.append(both[:, 0])
+                scale.append(both[:, 1])
+        return g, scale
+
+    def events(self) -> tuple[list[SystemEvent], list[ca.SX], list[ca.SX]]:
+        events: list[SystemEvent] = []
+        conditions: list[ca.SX] = []
+        periods: list[ca.SX] = []
+        for name, trace in self.plan.traces.items():
+            if not trace.events:
+                continue
+            holds = self.call(name, trace.condition, self.inputs[name])
+            lasts = self.call(name, trace.period, self.inputs[name])
+            for event in trace.events:
+                messages = tuple(f"{name}.{n}" for n in event.message_names)
+                events.append(SystemEvent(f"{name}.{event.name}", event.kind, f"{name}: {event.message}" if event.message else "", messages))
+                if event.condition is not None:
+                    conditions.append(holds[event.condition])
+                if event.period is not None:
+                    periods.append(lasts[event.period])
+        return events, conditions, periods
+
+    def stop(
+        self, variables: dict[str, Variable], events: list[SystemEvent], conditions: list[ca.SX], relations: list[ca.SX], scales: list[ca.SX]
+    ) -> ca.SX:
+        """Append the relations of ``stop_when``; return their bits."""
+        netlist = self.plan.design.netlist
+        text = netlist.sections.simulation.stop_when
+        if text is None:
+            return ca.SX(0, 1)
+        place = netlist.place("simulation", "stop_when")
+        found: list[tuple[Relation, ca.SX]] = []
+
+        def bit(relation: Relation) -> ca.SX:
+            found.append((relation, ca.SX.sym(f"stop{len(found)}")))
+            return found[-1][1]
+
+        try:
+            value = evaluate(text, self.lookup(variables, ""))
+            if not isinstance(value.value, Condition):
+                raise ExpressionError(f"{text!r} is no condition on the circuit's variables; write for example line.p > 9 bar")
+        except InputError as error:
+            raise error.at(place) from None
+        conditions.append(value.value.lower(bit))
+        events.append(SystemEvent("stop_when", "stop", text))
+        for relation, _ in found:
+            sides = (relation.lhs, relation.rhs) if relation.operator[0] == ">" else (relation.rhs, relation.lhs)
+            relations.append((sides[0] - sides[1]).sx)
+            scales.append((abs(relation.lhs) + abs(relation.rhs)).sx)
+        self.stop_strict = ["=" not in r.operator for r, _ in found]
+        return _cat([symbol for _, symbol in found])
+
+    def bits(self, g: ca.SX, b: ca.SX) -> Bits:
+        n = g.numel()
+        names = [f"{name}: {info.text}" for name, tr in self.plan.traces.items() for info in tr.relations]
+        strict = [info.strict for tr in self.plan.traces.values() for info in tr.relations]
+        extra = getattr(self, "stop_strict", [])
+        names += ["stop_when"] * len(extra)
+        strict += extra
+        on_state = _depends(g, self.x) if n else np.zeros(0, bool)
+        timed = (_depends(g, self.t) if n else np.zeros(0, bool)) & ~on_state
+        curved = np.array(ca.which_depends(g, self.t, 2, True), bool) if n and timed.any() else np.zeros(n, bool)
+        held = _depends(g, ca.vertcat(self.h, b)) if n else np.zeros(0, bool)
+        return Bits(tuple(names), np.array(strict, bool), on_state, timed, timed & ~curved, held)
+
+    def remap(self, b: ca.SX) -> ca.Function:
+        """All events' remaps in one function, those of one component composed in the order written."""
+        total = sum(len(tr.events) for tr in self.plan.traces.values()) + (1 if hasattr(self, "stop_strict") else 0)
+        fired = ca.SX.sym("fired", total)
+        new_x: list[ca.SX] = []
+        new_h: list[ca.SX] = []
+        at = 0
+        for name, trace in self.plan.traces.items():
+            xs, hs, bs, ps, pf = self.arguments[name]
+            nx = trace.states.size
+            for event in trace.events:
+                if event.remap is not None:
+                    both = event.remap(self.t, xs, hs, bs, self.inputs[name], ps, pf)
+                    xs, hs = (ca.if_else(fired[at], both[:nx], xs), ca.if_else(fired[at], both[nx:], hs))
+                at += 1
+            new_x.append(xs)
+            new_h.append(hs)
+        arguments = [self.t, self.x, self.h, b, fired, self.p]
+        return ca.Function("remap", arguments, [ca.densify(_cat(new_x)), ca.densify(_cat(new_h))])
+
+    # -- variables -------------------------------------------------------------------------------
+
+    def variables(self) -> dict[str, Variable]:
+        """Every name a result knows."""
+        found: dict[str, Variable] = {}
+        for (name, component), xs, hs in zip(self.plan.components.items(), self.xs, self.hs, strict=True):
+            trace = self.plan.traces[name]
+            for variable in self.of_component(name, component, trace, xs, hs):
+                found[variable.name] = variable
+        for variable in self.of_nets():
+            found.setdefault(variable.name, variable)
+        self.pending = {output.name: output for output in self.plan.design.outputs}
+        for output in self.plan.design.outputs:
+            if output.name in found and output.name not in self.resolved:
+                raise InputError(f"output {output.name!r} has the name of an existing variable; rename it", output.place)
+            self.resolve(output, found)
+        return found
+
+    def of_component(self, name: str, component: Component, trace: Trace, xs: ca.SX, hs: ca.SX) -> Iterator[Variable]:
+        cls = type(component)
+        for kind, layout, column in ((State, trace.states, xs), (Held, trace.held, hs)):
+            for declared in cls.declared(kind):
+                yield _variable(f"{name}.{declared.name}", component.quantity(declared.quantity), layout, declared.name, lambda c=column: c)
+        for declared in cls.declared(Observable):
+            yield _variable(
+                f"{name}.{declared.name}", component.quantity(declared.quantity), trace.observables, declared.name,
+                functools.partial(self.observe, name),
+            )  # fmt: skip
+        for port in cls.ports():
+            for layout, column, pairs in (
+                (trace.outputs, functools.partial(self.output_column, name), port.outputs()),
+                (trace.inputs, functools.partial(self.inputs.__getitem__, name), port.inputs()),
+            ):
+                for variable, quantity in pairs:
+                    shown = f"{name}.{port.name}" if port.domain is SIGNAL else f"{name}.{port.name}.{variable.removesuffix('_' + port.name)}"
+                    yield _variable(shown, component.quantity(quantity), layout, variable, column)
+
+    def observe(self, name: str) -> ca.SX:
+        if name not in self.observed:
+            self.observed[name] = self.call(name, self.plan.traces[name].observable, self.inputs[name])
+        return self.observed[name]
+
+    def output_column(self, name: str) -> ca.SX:
+        return _cat(self.outputs[name])
+
+    def of_nets(self) -> Iterator[Variable]:
+        """Across variables by net name and by the net's names inside subcircuits."""
+        groups: dict[str, list[Any]] = {}
+        for net in self.plan.graph.nets:
+            groups.setdefault(net.source.name, []).append(net)
+        for name, nets in groups.items():
+            source = nets[0].source
+            pairs = [("value", None)] if nets[0].domain is SIGNAL else list(nets[0].domain.across)
+            for k, (variable, quantity) in enumerate(pairs):
+                givers = [self.plan.givers.get(net.name) for net in nets]
+                if any(g is None for g in givers):
+                    continue
+                expressions = functools.partial(self.across, givers, k)
+                shown = quantity if quantity is not None else self.plan.graph.quantity(givers[0])
+                vector = nets[0].name != source.name
+                for alias in [name, *source.aliases]:
+                    yield Variable(f"{alias}.{variable}", shown, expressions, vector, listed=alias == name)
+
+    def across(self, givers: list[Any], k: int) -> list[ca.SX]:
+        found: list[ca.SX] = []
+        for giver in givers:
+            port = _port(self.plan.components[giver.instance], giver.port.name)
+            layout = self.plan.traces[giver.instance].outputs
+            found.append(self.outputs[giver.instance][layout.offsets[port.outputs()[k][0]][0] + giver.element])
+        return found
+
+    def lookup(self, variables: dict[str, Variable], scope: str) -> Callable[[str], Value]:
+        """Names in expressions: parameters of the scope, then variables seen from it."""
+        parameters = self.plan.design.parameters.get(scope, {})
+
+        def find(name: str) -> Value:
+            if name in parameters:
+                return parameters[name]
+            if scope + name in self.pending:
+                self.resolve(self.pending[scope + name], variables)
+            variable = variables.get(scope + name)
+            if variable is None:
+                known = [v.removeprefix(scope) for v in variables if v.startswith(scope)]
+                raise ExpressionError(f"unknown name {name!r}: {nearest(name, [*known, *parameters])}")
+            parts = variable.expression()
+            return Value(Sym(_cat(parts), (len(parts),)) if variable.vector else Sym(parts[0]), variable.quantity)
+
+        return find
+
+    def resolve(self, output: Output, variables: dict[str, Variable]) -> None:
+        """Make an output's variable, after those of the outputs it uses."""
+        if output.name in self.resolved:
+            return
+        if output.name in self.running:
+            raise ExpressionError(f"output {output.name!r} depends on itself", output.place)
+        self.running.append(output.name)
+        try:
+            made = evaluate(output.text, self.lookup(variables, output.scope))
+            if isinstance(made.value, str):
+                raise ExpressionError(f"this is the word {made.value!r}; an output is a number")
+        except InputError as error:
+            if error.place is None:
+                error.message = f"output {output.name!r}: {error.message}"
+            raise error.at(output.place) from None
+        self.running.pop()
+        self.resolved.add(output.name)
+        symbol = Sym.of(made.value)
+        elements = ca.vertsplit(symbol.sx) if symbol.shape != (0,) else []
+        variables[output.name] = Variable(output.name, made.quantity, lambda: elements, symbol.shape != ())
+
+    def contents(self) -> dict[str, tuple[Callable[[], ca.SX], Callable[[], tuple[ca.SX, ca.SX]]]]:
+        """Per storing component: its stored volume, and its flows."""
+        found: dict[str, tuple[Callable[[], ca.SX], Callable[[], tuple[ca.SX, ca.SX]]]] = {}
+        for name, component in self.plan.components.items():
+            for declared in type(component).declared(Observable):
+                if declared.stored:
+                    found[name] = (functools.partial(self.content, name, declared.name), functools.partial(self.flows, name))
+        return found
+
+    def content(self, name: str, observable: str) -> ca.SX:
+        layout = self.plan.traces[name].observables
+        return ca.sum1(self.observe(name)[list(layout.indices(observable))])
+
+    def flows(self, name: str) -> tuple[ca.SX, ca.SX]:
+        component, trace = self.plan.components[name], self.plan.traces[name]
+        total, size = ca.SX(0), ca.SX(0)
+        for port in type(component).ports():
+            if port.domain is not HYDRAULIC or port.role == "reads":
+                continue
+            layout, column = (trace.inputs, self.inputs[name]) if port.role == "gives" else (trace.outputs, self.output_column(name))
+            for k in layout.indices(f"q_{port.name}"):
+                total, size = total + column[k], size + ca.fabs(column[k]) / 2
+        return total, size
+
+
+def _variable(name: str, quantity: Quantity, layout: Any, slot: str, column: Callable[[], ca.SX]) -> Variable:
+    indices = layout.indices(slot)
+
+    def expression() -> list[ca.SX]:
+        whole = column()
+        return [whole[k] for k in indices]
+
+    return Variable(name, quantity, expression, layout.offsets[slot][1] is not None)
+
+
+def _split(name: str, sizes: list[int]) -> tuple[ca.SX, list[ca.SX]]:
+    """One symbol vector and its consecutive pieces."""
+    whole = ca.SX.sym(name, sum(sizes))
+    if not sizes:
+        return whole, []
+    return whole, ca.vertsplit(whole, [0, *np.cumsum(sizes).tolist()])
+
+
+def _cat(items: list[ca.SX]) -> ca.SX:
+    filled = [i for i in items if i.numel()]
+    return ca.vertcat(*filled) if filled else ca.SX(0, 1)
+
+
+def _depends(expression: ca.SX, symbols: ca.SX) -> Array:
+    """Per row of ``expression``, whether it depends on any of ``symbols``."""
+    if not symbols.numel():
+        return np.zeros(expression.numel(), bool)
+    return np.array(ca.which_depends(expression, symbols, 1, True), bool)
