@@ -1,0 +1,268 @@
+"""The distributed line solved by the Lax-Wendroff scheme: a family of four causal forms."""
+
+from functools import reduce
+from typing import Any, ClassVar
+
+import numpy as np
+from pydantic import Field
+
+from crescentlab.component import Component, Equations, structural
+from crescentlab.domain import gives_pressure, held, observable, state, stores, takes_pressure, undecided_pressure
+from crescentlab.fluid import Fluid
+from crescentlab.maths import Expr, every, fabs, maximum, pi, stack, total
+from crescentlab.units import Flow, Length, Pressure, Ratio, Time, Volume
+
+from .flow_laws import pipe_friction_drop
+from .wave_laws import (
+    Wave,
+    arriving_wave,
+    end_flow,
+    end_pressure,
+    lax_wendroff_step,
+    pressure_of_density,
+    share_out,
+    wave_speed,
+)
+
+CELL_LENGTH_OVER_DIAMETER = 6
+"""Length over diameter [-] of the cells, where `internal_nodes` is not given."""
+
+
+def _start_pressures(line: "LaxWendroffLine", fluid: Fluid | None = None) -> np.ndarray:
+    if fluid is None:
+        return np.full(line.nodes, line.start_pressure)
+    loss: Any = line.entry_loss(fluid) * line.start_flow * abs(line.start_flow)
+    gradient = line.friction(fluid)(line.start_flow, line.start_pressure - loss)
+    return np.asarray(line.start_pressure - loss - gradient * np.linspace(0.0, line.length, line.nodes))
+
+
+class LaxWendroffLine(Component):
+    r"""Straight rigid line with travelling waves, by the two-step Lax-Wendroff scheme.
+
+    .. math:: A \frac{\partial r}{\partial t} + \frac{\partial q}{\partial x} = 0, \qquad
+              \frac{\rho_0}{A}\frac{\partial q}{\partial t} + \frac{\partial p}{\partial x}
+              = -\frac{f}{d}\frac{\rho v|v|}{2}, \qquad r = \rho(p)/\rho_0, \; v = q/(A r)
+
+    p [Pa] gauge; q [m^3/s] mass flow over \rho_0, positive from a to b; A = \pi d^2/4 [m^2]; d [m]; x [m];
+    v [m/s]; \rho [kg/m^3], \rho_0 at 0 bar gauge; f [-] Darcy factor of steady flow (Churchill), each taken
+    from the fluid at every node and half node. The nodes are \Delta x [m] apart and step every
+    \Delta t = 0.9 \Delta x / a(p_{max}) [s]. Between two ticks an end sees the wave that arrives there,
+    p - Z q = const. along dx/dt = -a, Z = \rho_0 a/A [Pa s/m^3], from a foot interpolated among the nodes, so
+    that pressure and flow at the ends are continuous at the ticks; the entry loss
+    \Delta p = K \rho_0 q|q|/(2A^2) sits at end a. The fluid in the line, half cells at its ends, is
+    kept exactly: what a half cell and the flow through its end disagree by goes to the two nodes beside it.
+    Valid while (a + |v|) \Delta t/\Delta x, the observable `courant`, stays below 1. Not for friction that
+    depends on frequency, for flow near the speed of sound, or for lines shorter than some ten diameters.
+    Source: R. D. Richtmyer, NCAR Technical Note 63-2 (1962); ends by the method of characteristics,
+    Wylie & Streeter, Fluid Transients in Systems (1993), chapter 3; Rundo & Corvaglia (2016), section 5.
+    """
+
+    family: ClassVar[bool] = True
+
+    diameter: Length = structural(gt=0, description="inner diameter")
+    length: Length = structural(gt=0, description="length")
+    internal_nodes: int | None = Field(
+        default=None, ge=1, description="nodes between the ends; default from cells six diameters long, at least 1"
+    )
+    loss_coefficient: Ratio = Field(default=0.0, ge=0, description="entry loss at a over the dynamic head")
+    roughness: Length = Field(default=0.0, ge=0, description="height of the wall's roughness")
+    max_pressure: Pressure = Field(gt=0, description="highest pressure expected; sets the tick by its wave speed")
+    courant_number: Ratio = Field(default=0.9, gt=0, le=1, description="Courant number at max_pressure")
+    start_pressure: Pressure = Field(default=0.0, description="pressure at a at the start, lower towards b by friction")
+    start_flow: Flow = Field(default=0.0, description="flow from a to b at the start")
+
+    a = undecided_pressure("first end")
+    b = undecided_pressure("second end")
+    p_node = held(Pressure, "pressure of each node, from a to b", start=_start_pressures, size="nodes")
+    q_node = held(Flow, "flow from a to b of each node", start="start_flow", size="nodes")
+    t_node = held(Time, "time of the nodes' values")
+    into_a = state(Volume, "fluid taken in at a since the start", nominal=1e-8)
+    into_b = state(Volume, "fluid taken in at b since the start", nominal=1e-8)
+    had_a = held(Volume, "into_a at the last tick")
+    had_b = held(Volume, "into_b at the last tick")
+    q = observable(Flow, "flow from a to b, at a")
+    courant = observable(Ratio, "largest Courant number of the nodes; above 1 the scheme is not valid")
+    p_highest = observable(Pressure, "highest pressure of the nodes; max_pressure must not be below it")
+    content = stores()
+
+    @property
+    def cells(self) -> int:
+        """Number of cells, one less than nodes."""
+        if self.internal_nodes is not None:
+            return self.internal_nodes + 1
+        return max(2, round(self.length / (CELL_LENGTH_OVER_DIAMETER * self.diameter)))
+
+    @property
+    def nodes(self) -> int:
+        """Number of nodes, both ends included."""
+        return self.cells + 1
+
+    @property
+    def area(self) -> float:
+        """Area of the bore [m^2]."""
+        return pi * self.diameter * self.diameter / 4
+
+    @property
+    def cell(self) -> float:
+        """Distance of neighbouring nodes [m]."""
+        return self.length / self.cells
+
+    def entry_loss(self, fluid: Fluid) -> Any:
+        """k of the entry loss k q|q| [Pa s^2/m^6]."""
+        return self.loss_coefficient * fluid.rho_0 / (2 * self.area * self.area)
+
+    def friction(self, fluid: Fluid) -> Any:
+        """Pressure gradient of steady friction [Pa/m] as a function of q and p."""
+        return lambda q, p: pipe_friction_drop(q, 1.0, self.diameter, self.roughness, fluid, p)
+
+    def waves(self, p: Expr, q: Expr, elapsed: Expr, fluid: Fluid) -> tuple[Wave, Wave]:
+        """The waves arriving at a and at b, `elapsed` [s] after the nodes' values p and q were taken."""
+        to_a = arriving_wave((p[0], p[1], p[2]), (q[0], q[1], q[2]), elapsed, self.cell, self.friction(fluid), fluid)
+        to_b = arriving_wave(
+            (p[-1], p[-2], p[-3]), (-q[-1], -q[-2], -q[-3]), elapsed, self.cell, self.friction(fluid), fluid
+        )
+        return to_a, to_b
+
+    def flow_at_a(self, p: Expr, wave: Wave, fluid: Fluid) -> Any:
+        """q_a from the pressure taken there."""
+        return end_flow(p, wave, self.entry_loss(fluid), self.area, fluid)
+
+    def flow_at_b(self, p: Expr, wave: Wave, fluid: Fluid) -> Any:
+        """q_b from the pressure taken there."""
+        return end_flow(p, wave, 0.0, self.area, fluid)
+
+    def pressure_at_a(self, q: Expr, wave: Wave, fluid: Fluid) -> Any:
+        """p_a from the flow received there."""
+        return end_pressure(q, wave, self.entry_loss(fluid), self.area, fluid)
+
+    def pressure_at_b(self, q: Expr, wave: Wave, fluid: Fluid) -> Any:
+        """p_b from the flow received there."""
+        return end_pressure(q, wave, 0.0, self.area, fluid)
+
+    def nodes_and_tick(
+        self, p_node: Expr, q_node: Expr, into_a: Expr, into_b: Expr, had_a: Expr, had_b: Expr,
+        p_a: Expr, q_a: Expr, p_b: Expr, q_b: Expr, t: Expr, fluid: Fluid,
+    ) -> Equations:  # fmt: skip
+        """What all forms share: the fluid taken in, what the nodes hold, and how they step."""
+        rho_0, area, dx, friction = fluid.rho_0, self.area, self.cell, self.friction(fluid)
+        dt = self.courant_number * dx / wave_speed(self.max_pressure, fluid)
+        r = fluid.density(p_node) / rho_0
+        taken_a, taken_b = into_a - had_a, into_b - had_b
+
+        step = lax_wendroff_step(p_node, q_node, dt, dx, area, friction, fluid)
+        p_first, p_last = p_a - self.entry_loss(fluid) * q_a * fabs(q_a), p_b
+        gained_a = area * dx / 2 * (fluid.density(p_first) / rho_0 - r[0])
+        gained_b = area * dx / 2 * (fluid.density(p_last) / rho_0 - r[-1])
+        over_a = taken_a - dt * step.q_between[0] - gained_a
+        over_b = taken_b + dt * step.q_between[-1] - gained_b
+        r_inner = step.r + share_out(over_a, over_b, self.nodes - 2) / (area * dx)
+        p_inner = pressure_of_density(r_inner * rho_0, p_node[1:-1], fluid)
+
+        return {
+            "der_into_a": q_a,
+            "der_into_b": q_b,
+            "q": q_a,
+            "courant": reduce(maximum, wave_speed(p_node, fluid) + fabs(q_node) / (area * r)) * dt / dx,
+            "p_highest": reduce(maximum, p_node),
+            "content": area * dx * (total(r) - (r[0] + r[-1]) / 2) + taken_a + taken_b,
+            "tick": every(
+                dt,
+                p_node=stack(p_first, p_inner, p_last),
+                q_node=stack(q_a, step.q, -q_b),
+                t_node=t,
+                had_a=into_a,
+                had_b=into_b,
+            ),
+        }
+
+
+class LaxWendroffLineTakesTakes(LaxWendroffLine):
+    """Lax-Wendroff line that takes the pressure at both ends.
+
+    Equations, symbols, limits and Source: :class:`LaxWendroffLine`; q [m^3/s], p [Pa].
+    """
+
+    family: ClassVar[bool] = False
+
+    a = takes_pressure("first end")
+    b = takes_pressure("second end")
+
+    def equations(
+        self, p_node: Expr, q_node: Expr, t_node: Expr, into_a: Expr, into_b: Expr, had_a: Expr, had_b: Expr,
+        p_a: Expr, p_b: Expr, t: Expr, fluid: Fluid,
+    ) -> Equations:  # fmt: skip
+        to_a, to_b = self.waves(p_node, q_node, t - t_node, fluid)
+        q_a, q_b = self.flow_at_a(p_a, to_a, fluid), self.flow_at_b(p_b, to_b, fluid)
+        shared = self.nodes_and_tick(
+            p_node, q_node, into_a, into_b, had_a, had_b, p_a, q_a, p_b, q_b, t, fluid
+        )  # fmt: skip
+        return {"q_a": q_a, "q_b": q_b} | shared
+
+
+class LaxWendroffLineTakesGives(LaxWendroffLine):
+    """Lax-Wendroff line that takes the pressure at a and gives it at b.
+
+    Equations, symbols, limits and Source: :class:`LaxWendroffLine`; q [m^3/s], p [Pa].
+    """
+
+    family: ClassVar[bool] = False
+
+    a = takes_pressure("first end")
+    b = gives_pressure("second end")
+
+    def equations(
+        self, p_node: Expr, q_node: Expr, t_node: Expr, into_a: Expr, into_b: Expr, had_a: Expr, had_b: Expr,
+        p_a: Expr, q_b: Expr, t: Expr, fluid: Fluid,
+    ) -> Equations:  # fmt: skip
+        to_a, to_b = self.waves(p_node, q_node, t - t_node, fluid)
+        q_a, p_b = self.flow_at_a(p_a, to_a, fluid), self.pressure_at_b(q_b, to_b, fluid)
+        shared = self.nodes_and_tick(
+            p_node, q_node, into_a, into_b, had_a, had_b, p_a, q_a, p_b, q_b, t, fluid
+        )  # fmt: skip
+        return {"q_a": q_a, "p_b": p_b} | shared
+
+
+class LaxWendroffLineGivesTakes(LaxWendroffLine):
+    """Lax-Wendroff line that gives the pressure at a and takes it at b.
+
+    Equations, symbols, limits and Source: :class:`LaxWendroffLine`; q [m^3/s], p [Pa].
+    """
+
+    family: ClassVar[bool] = False
+
+    a = gives_pressure("first end")
+    b = takes_pressure("second end")
+
+    def equations(
+        self, p_node: Expr, q_node: Expr, t_node: Expr, into_a: Expr, into_b: Expr, had_a: Expr, had_b: Expr,
+        q_a: Expr, p_b: Expr, t: Expr, fluid: Fluid,
+    ) -> Equations:  # fmt: skip
+        to_a, to_b = self.waves(p_node, q_node, t - t_node, fluid)
+        p_a, q_b = self.pressure_at_a(q_a, to_a, fluid), self.flow_at_b(p_b, to_b, fluid)
+        shared = self.nodes_and_tick(
+            p_node, q_node, into_a, into_b, had_a, had_b, p_a, q_a, p_b, q_b, t, fluid
+        )  # fmt: skip
+        return {"p_a": p_a, "q_b": q_b} | shared
+
+
+class LaxWendroffLineGivesGives(LaxWendroffLine):
+    """Lax-Wendroff line that gives the pressure at both ends.
+
+    Equations, symbols, limits and Source: :class:`LaxWendroffLine`; q [m^3/s], p [Pa].
+    """
+
+    family: ClassVar[bool] = False
+
+    a = gives_pressure("first end")
+    b = gives_pressure("second end")
+
+    def equations(
+        self, p_node: Expr, q_node: Expr, t_node: Expr, into_a: Expr, into_b: Expr, had_a: Expr, had_b: Expr,
+        q_a: Expr, q_b: Expr, t: Expr, fluid: Fluid,
+    ) -> Equations:  # fmt: skip
+        to_a, to_b = self.waves(p_node, q_node, t - t_node, fluid)
+        p_a, p_b = self.pressure_at_a(q_a, to_a, fluid), self.pressure_at_b(q_b, to_b, fluid)
+        shared = self.nodes_and_tick(
+            p_node, q_node, into_a, into_b, had_a, had_b, p_a, q_a, p_b, q_b, t, fluid
+        )  # fmt: skip
+        return {"p_a": p_a, "p_b": p_b} | shared

@@ -1,0 +1,222 @@
+"""Translational mechanics: masses, springs, dampers, forces and imposed motion. No fluid here."""
+
+from typing import Self
+
+from pydantic import Field, model_validator
+
+from crescentlab.component import Component, Equations
+from crescentlab.domain import gives_motion, held, observable, state, takes_motion, takes_signal
+from crescentlab.maths import Expr, fabs, maximum, minimum, when, where
+from crescentlab.units import Damping, Force, Length, Mass, Ratio, Stiffness, Velocity
+
+
+class MassWithStops(Component):
+    r"""Mass between two rigid stops: rebounds with restitution, rests on a stop until the force pulls it off.
+
+    .. math:: m \frac{dv}{dt} = \sum f, \quad \frac{dx}{dt} = v, \quad v^+ = -e\,v^- \text{ at a stop}
+
+    m = `mass` [kg]; x [m], v [m/s]; f [N] on the mass; e = `restitution` [-]; stops at `low` and `high` [m].
+    A rebound slower than `rest_speed` [m/s] ends at rest, so with e = 0 every hit does. A resting mass does not
+    move; it leaves at v = 0 as soon as the force points away from its stop. It starts resting if it starts at
+    (or beyond) a stop no faster than `rest_speed`, otherwise free. Not for elastic stops, nor for the time and
+    force of an impact. Source: Newton's second law and law of impact.
+    """
+
+    mass: Mass = Field(gt=0, description="moving mass")
+    low: Length = Field(default=0.0, description="position of the low stop")
+    high: Length = Field(description="position of the high stop")
+    restitution: Ratio = Field(default=0.0, ge=0, le=1, description="rebound speed over impact speed")
+    rest_speed: Velocity = Field(default=1e-3, gt=0, description="a rebound slower than this ends at rest")
+
+    port = gives_motion("the mass")
+    x = state(Length, "position", start="low", nominal=1e-3)
+    v = state(Velocity, "velocity", start=0.0, nominal=1e-2)
+    at = held(Ratio, "-1 rests on the low stop, 1 on the high one, 0 free; -2 until the start is looked at", start=-2.0)
+
+    @model_validator(mode="after")
+    def _stops_in_order(self) -> Self:
+        if self.low >= self.high:
+            raise ValueError(f"high ({self.high * 1e3:g} mm) must lie above low ({self.low * 1e3:g} mm)")
+        return self
+
+    def equations(self, x: Expr, v: Expr, at: Expr, f_port: Expr) -> Equations:
+        free = at == 0
+        rebound = -self.restitution * v
+        fast = fabs(rebound) > self.rest_speed
+        slow = fabs(v) <= self.rest_speed
+        rests = where(slow & (x <= self.low), -1.0, where(slow & (x >= self.high), 1.0, 0.0))
+        return {
+            "x_port": x,
+            "v_port": v,
+            "der_x": v,
+            "der_v": where(free, f_port / self.mass, 0.0),
+            "hits_low": when(free & (x < self.low), x=self.low, v=where(fast, rebound, 0.0), at=where(fast, 0.0, -1.0)),
+            "hits_high": when(
+                free & (x > self.high), x=self.high, v=where(fast, rebound, 0.0), at=where(fast, 0.0, 1.0)
+            ),
+            "leaves": when((at == -1) & (f_port > 0) | (at == 1) & (f_port < 0), at=0.0),
+            "starts": when(
+                at == -2, x=minimum(maximum(x, self.low), self.high), v=where(fabs(rests) > 0.5, 0.0, v), at=rests
+            ),
+        }
+
+
+class StickSlipMass(Component):
+    r"""Mass with dry friction against the ground, which sticks exactly and breaks away by events.
+
+    .. math:: m \frac{dv}{dt} = \sum f - F_c\,\mathrm{sign}\,v \quad (v \ne 0), \qquad
+              v = 0 \text{ while } \left|\sum f\right| \le F_s
+
+    m = `mass` [kg]; x [m], v [m/s]; f [N] on the mass; F_c = `coulomb_friction`, F_s = `static_friction` [N].
+    When v crosses zero the mass sticks, or slides on backwards if |f| > F_s at that instant; it breaks away when
+    |f| > F_s. Friction forces do not depend on speed while sliding. Not for the Stribeck curve, nor for friction
+    between two moving parts. Source: Coulomb's law of friction; Karnopp, J. Dyn. Syst. Meas. Control 107 (1985)
+    100-103, with the zero-velocity band replaced by an event.
+    """
+
+    mass: Mass = Field(gt=0, description="moving mass")
+    coulomb_friction: Force = Field(ge=0, description="friction force while sliding")
+    static_friction: Force = Field(ge=0, description="largest friction force while sticking; at least coulomb_friction")
+
+    port = gives_motion("the mass")
+    x = state(Length, "position", start=0.0, nominal=1e-3)
+    v = state(Velocity, "velocity", start=0.0, nominal=1e-2)
+    direction = held(Ratio, "1 slides up, -1 slides down, 0 sticks; 2 until the start is looked at", start=2.0)
+    sticking = observable(Ratio, "1 while the mass sticks, 0 while it slides")
+    friction = observable(Force, "friction force on the mass")
+
+    @model_validator(mode="after")
+    def _static_is_larger(self) -> Self:
+        if self.static_friction < self.coulomb_friction:
+            raise ValueError(
+                f"static_friction ({self.static_friction:g} N) must be at least coulomb_friction "
+                f"({self.coulomb_friction:g} N)"
+            )
+        return self
+
+    def equations(self, x: Expr, v: Expr, direction: Expr, f_port: Expr) -> Equations:
+        sticks = direction == 0
+        slides = (direction == 1) | (direction == -1)
+        friction = where(slides, -direction * self.coulomb_friction, -f_port)
+        onward = where(f_port > self.static_friction, 1.0, where(f_port < -self.static_friction, -1.0, 0.0))
+        return {
+            "x_port": x,
+            "v_port": v,
+            "der_x": v,
+            "der_v": where(slides, (f_port - direction * self.coulomb_friction) / self.mass, 0.0),
+            "sticking": where(slides, 0.0, 1.0),
+            "friction": friction,
+            "stops": when((direction == 1) & (v < 0) | (direction == -1) & (v > 0), v=0.0, direction=onward),
+            "breaks_away_up": when(sticks & (f_port > self.static_friction), direction=1.0),
+            "breaks_away_down": when(sticks & (f_port < -self.static_friction), direction=-1.0),
+            "starts": when(direction == 2, direction=where(v > 0, 1.0, where(v < 0, -1.0, 0.0))),
+        }
+
+
+class Spring(Component):
+    r"""Linear spring against the ground; it pushes its rod towards decreasing x.
+
+    .. math:: F = F_0 + k x
+
+    F [N] on the rod's mass, towards -x; F_0 = `preload` [N] at x = 0; k = `stiffness` [N/m]; x [m]. Not for a
+    spring that lifts off: it pulls where F < 0. Source: Hooke's law.
+    """
+
+    stiffness: Stiffness = Field(gt=0, description="force per deflection")
+    preload: Force = Field(default=0.0, description="force at x = 0")
+
+    rod = takes_motion("the moving end")
+    force = observable(Force, "spring force, positive towards decreasing x")
+
+    def equations(self, x_rod: Expr) -> Equations:
+        force = self.preload + self.stiffness * x_rod
+        return {"f_rod": force, "force": force}
+
+
+class SpringBetween(Component):
+    r"""Linear spring between two moving parts.
+
+    .. math:: F = k (x_b - x_a - l_0)
+
+    F [N] tension, pulling a towards +x and b towards -x; k = `stiffness` [N/m]; x_a, x_b [m];
+    l_0 = `free_length` [m]. Not for a spring with mass, nor for one that lifts off. Source: Hooke's law.
+    """
+
+    stiffness: Stiffness = Field(gt=0, description="force per extension")
+    free_length: Length = Field(default=0.0, description="x_b - x_a without force")
+
+    a = takes_motion("first end")
+    b = takes_motion("second end")
+    tension = observable(Force, "spring force, positive in tension")
+
+    def equations(self, x_a: Expr, x_b: Expr) -> Equations:
+        tension = self.stiffness * (x_b - x_a - self.free_length)
+        return {"f_a": -tension, "f_b": tension, "tension": tension}
+
+
+class Damper(Component):
+    r"""Viscous damper against the ground.
+
+    .. math:: F = B v
+
+    F [N] on the rod's mass, against its velocity v [m/s]; B = `coefficient` [N s/m]. Not for dry friction
+    (`stick_slip_mass`). Source: definition of viscous damping.
+    """
+
+    coefficient: Damping = Field(ge=0, description="force per velocity")
+
+    rod = takes_motion("the moving end")
+
+    def equations(self, v_rod: Expr) -> Equations:
+        return {"f_rod": self.coefficient * v_rod}
+
+
+class ForceSource(Component):
+    r"""Constant force on a mass.
+
+    .. math:: f_{rod} = -F
+
+    F = `force` [N] pushes the rod's mass towards increasing x; f_rod [N] is its reaction on the source. Not for
+    forces that change with time (`signal_force_source`). Source: Newton's third law.
+    """
+
+    force: Force = Field(description="force on the mass, positive towards increasing x")
+
+    rod = takes_motion("the pushed mass")
+
+    def equations(self) -> Equations:
+        return {"f_rod": -self.force}
+
+
+class SignalForceSource(Component):
+    r"""Force on a mass, given by a signal.
+
+    .. math:: f_{rod} = -F(t)
+
+    F = `force` [N], a signal, pushes the rod's mass towards increasing x; f_rod [N] is its reaction on the
+    source. Not for a drive that imposes the motion (`motion_source`). Source: Newton's third law.
+    """
+
+    force = takes_signal(Force, "force on the mass, positive towards increasing x")
+    rod = takes_motion("the pushed mass")
+
+    def equations(self, force: Expr) -> Equations:
+        return {"f_rod": -force}
+
+
+class MotionSource(Component):
+    r"""Motion at constant velocity, whatever the force: a belt, a slow drive, or the ground.
+
+    .. math:: x = x_0 + V t, \quad v = V
+
+    x [m]; v [m/s]; x_0 = `position` [m] at t = 0; V = `velocity` [m/s]; t [s]. Not for a drive that gives way
+    under load. Source: definition of uniform motion.
+    """
+
+    velocity: Velocity = Field(default=0.0, description="constant velocity; 0 is the ground")
+    position: Length = Field(default=0.0, description="position at t = 0")
+
+    port = gives_motion("the driven end")
+
+    def equations(self, t: Expr) -> Equations:
+        return {"x_port": self.position + self.velocity * t, "v_port": self.velocity}

@@ -1,0 +1,136 @@
+"""Circuit: the public door. Load a file, simulate it, look at its causality.
+
+The arrows of the design in one place: text -> netlist -> design -> graph -> plan -> system ->
+trajectory -> result. A change of parameter values reuses the assembled system.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Mapping
+from importlib import resources
+from pathlib import Path
+from typing import Any
+
+from crescentlab.causality import Plan, plan
+from crescentlab.elaborate import Design, elaborate
+from crescentlab.errors import InputError, SimulationError, nearest
+from crescentlab.graph import build
+from crescentlab.library import Library, installed
+from crescentlab.netlist import Netlist
+from crescentlab.result import Result
+from crescentlab.solvers.loop import Options, integrate
+from crescentlab.system import System, assemble
+from crescentlab.trace import structure_of
+from crescentlab.units import QUANTITIES, UnitError
+
+
+def shipped() -> dict[str, Path]:
+    """Circuits that come with crescentlab, by name (parts left out)."""
+    folder = Path(str(resources.files("crescentlab.circuits")))
+    return {p.stem: p for p in sorted(folder.glob("*.yaml")) if not p.stem.endswith("_part")}
+
+
+def find(name: str | Path) -> Path:
+    """The file of a path or of a shipped circuit's name; raises :class:`InputError` offering the nearest."""
+    path = Path(name)
+    if path.is_file():
+        return path
+    known = shipped()
+    if str(name) in known:
+        return known[str(name)]
+    if path.suffix or len(path.parts) > 1:
+        raise InputError(f"{name}: no such file; a circuit is a .yaml file, or one of: {', '.join(known)}")
+    raise InputError(f"{name}: no circuit of this name: {nearest(str(name), known)}")
+
+
+def load(name: str | Path, *, no_code: bool = False) -> Circuit:
+    """Read a circuit file, or a shipped circuit by name."""
+    return Circuit(Netlist.read(find(name)), no_code=no_code)
+
+
+class Circuit:
+    """A circuit ready to be checked and simulated."""
+
+    def __init__(self, netlist: Netlist, *, library: Library | None = None, no_code: bool = False) -> None:
+        self.netlist = netlist
+        self._library = library
+        self.no_code = no_code
+        self._systems: dict[Any, System] = {}
+        self.assembly_s = 0.0
+
+    @property
+    def library(self) -> Library:
+        """Installed components, found when first needed."""
+        if self._library is None:
+            self._library = installed()
+        return self._library
+
+    def design(self, parameters: Mapping[str, str] | None = None) -> Design:
+        """The flat circuit with numbers; ``parameters`` as for ``--set``."""
+        return elaborate(self.netlist, self.library, parameters, no_code=self.no_code)
+
+    def plan(self, parameters: Mapping[str, str] | None = None, *, allow_open: bool = False) -> Plan:
+        """Its causality; raises an explained conflict."""
+        return plan(build(self.design(parameters)), self.library, allow_open=allow_open)
+
+    def system(self, parameters: Mapping[str, str] | None = None) -> System:
+        """The assembled ODE."""
+        return self._assembled(self.design(parameters))
+
+    def _assembled(self, design: Design) -> System:
+        key = tuple((n, structure_of(i.component)) for n, i in design.instances.items())
+        key += tuple(structure_of(f) for f in design.fluids.values())
+        if key not in self._systems:
+            begun = time.perf_counter()
+            self._systems[key] = assemble(plan(build(design), self.library))
+            self.assembly_s = time.perf_counter() - begun
+        return self._systems[key]
+
+    def simulate(
+        self, stop: str | float | None = None, parameters: Mapping[str, str | float] | None = None, *, solver: str | None = None,
+        rtol: float | None = None, output_step: str | float | None = None, max_step: str | float | None = None,
+        progress: Callable[[float], None] | None = None, check: bool = True,
+    ) -> Result:  # fmt: skip
+        """Integrate the circuit; text needs units, floats are SI.
+
+        Raises :class:`InputError` for wrong input, and, with ``check``, :class:`SimulationError` if the run
+        fails, its ``result`` attribute holding what was computed.
+        """
+        design = self.design({k: _text(v) for k, v in (parameters or {}).items()})
+        system = self._assembled(design)
+        section = self.netlist.sections.simulation
+        options = Options(
+            stop=_time(stop, "stop", section.stop), rtol=section.rtol if rtol is None else rtol, solver=solver or section.solver,
+            max_step=_time(max_step, "max_step", section.max_step), output_step=_time(output_step, "output_step", section.output_step),
+        )  # fmt: skip
+        if not 0 < options.rtol < 1:
+            raise InputError(f"rtol {options.rtol:g}: the relative tolerance lies between 0 and 1; write for example 1e-6")
+        values = system.values(design)
+        trajectory = integrate(system, values, options, progress)
+        result = Result(system, values, design, trajectory)
+        if check and trajectory.status == "failed":
+            failure = SimulationError(trajectory.error)
+            failure.result = result  # type: ignore[attr-defined]
+            raise failure
+        if check and trajectory.status == "interrupted":
+            raise KeyboardInterrupt(trajectory.error)
+        return result
+
+
+def _text(value: str | float) -> str:
+    if isinstance(value, str):
+        return value
+    raise InputError(f"parameter value {value!r} has no unit; write text such as '3000 rpm'")
+
+
+def _time(value: str | float | None, name: str, default: Any) -> Any:
+    if value is None:
+        return default
+    try:
+        seconds = QUANTITIES["time"].parse(value) if isinstance(value, str) else float(value)
+    except UnitError as error:
+        raise InputError(f"{name}: {error.message}") from None
+    if not seconds > 0:
+        raise InputError(f"{name}: {value} must be above 0")
+    return seconds

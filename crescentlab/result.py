@@ -1,0 +1,257 @@
+"""Named, unit-carrying series of a run; netCDF, CSV and Parquet files of them.
+
+A result keeps times, states and held values; every other variable is evaluated from the circuit's own
+equations when it is asked for. A file holds what was recorded, and says so.
+"""
+
+from __future__ import annotations
+
+import csv
+import functools
+import math
+import re
+from collections.abc import Iterable, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from crescentlab import __version__
+from crescentlab.errors import InputError, nearest
+from crescentlab.units import DISPLAY, QUANTITIES, Quantity
+
+if TYPE_CHECKING:
+    import pandas
+    import xarray
+
+    from crescentlab.balance import Balance
+    from crescentlab.elaborate import Design
+    from crescentlab.solvers.trajectory import Trajectory
+    from crescentlab.system import System, Values
+
+SUFFIXES = (".nc", ".csv", ".parquet")
+
+
+class Result:
+    """A run of a circuit. ``result["line.p"]`` is a numpy array in SI, one row per time."""
+
+    def __init__(self, system: System, values: Values, design: Design, trajectory: Trajectory) -> None:
+        self.system, self.values, self.design, self.trajectory = system, values, design, trajectory
+        self.title = design.netlist.sections.title or design.netlist.name
+        self._rows = trajectory.shown.arrays()
+        self._series: dict[str, np.ndarray] = {}
+
+    @property
+    def time(self) -> np.ndarray:
+        """Times [s], shape (m,); an event's time stands twice, before and after."""
+        return self._rows[0]
+
+    @property
+    def names(self) -> list[str]:
+        """Every variable that can be asked for."""
+        return [name for name, v in self.system.variables.items() if v.listed]
+
+    def quantity(self, name: str) -> Quantity:
+        """The quantity of a variable or of one element of it."""
+        return self.system.find(_split(name)[0]).quantity
+
+    def __getitem__(self, name: str) -> np.ndarray:
+        """Series of a variable: shape (m,), for a vector (m, n); ``name[2]`` is one element (from 1)."""
+        base, element = _split(name)
+        self.load([base])
+        series = self._series[base]
+        if element is None:
+            return series if self.system.variables[base].vector else series[:, 0]
+        if not 1 <= element <= series.shape[1]:
+            raise InputError(f"{name}: {base} has {series.shape[1]} elements, counted from 1")
+        return series[:, element - 1]
+
+    def load(self, names: Iterable[str]) -> None:
+        """Evaluate several variables at once (faster than one by one)."""
+        missing = [n for n in dict.fromkeys(names) if n not in self._series]
+        if not missing:
+            return
+        sizes = [len(self.system.find(n).expression()) for n in missing]
+        t, x, h, b = self._rows
+        columns = self.system.function_of(missing)(t.reshape(1, -1), x.T, h.T, b.T, self.values.p)
+        values = np.array(columns).T.reshape(t.size, -1)
+        for name, part in zip(missing, np.split(values, np.cumsum(sizes)[:-1], axis=1), strict=True):
+            self._series[name] = part
+
+    def mean(self, name: str, start: float = 0.0, stop: float = math.inf) -> float:
+        """Mean over time between ``start`` and ``stop`` [s], trapezoidal between rows."""
+        inside = (self.time >= start) & (self.time <= stop)
+        t, y = self.time[inside], self[name][inside]
+        return float(np.trapezoid(y, t) / (t[-1] - t[0]))
+
+    @functools.cached_property
+    def balance(self) -> Balance | None:
+        """The ledger of stored fluid; None with mean volumes or without storing parts."""
+        from crescentlab.balance import balance
+
+        if any(getattr(i.component, "volumes", "") == "mean" for i in self.design.instances.values()):
+            return None
+        return balance(self.system, self.values, self.trajectory)
+
+    # -- out -------------------------------------------------------------------------------------
+
+    def columns(self, record: Sequence[str] = ()) -> dict[str, np.ndarray]:
+        """Series by column name, vectors element by element, chosen by globs (``*`` and ``?`` only)."""
+        names = self.chosen(record)
+        self.load(dict.fromkeys(_split(n)[0] for n in names))
+        return {n: self[n] for n in names}
+
+    def chosen(self, record: Sequence[str] = ()) -> list[str]:
+        """Column names that match the globs, all of them without globs."""
+        every: list[str] = []
+        for name in self.names:
+            variable = self.system.variables[name]
+            every += [f"{name}[{k + 1}]" for k in range(len(variable.expression()))] if variable.vector else [name]
+        if not record:
+            return every
+        chosen: list[str] = []
+        for glob in record:
+            pattern = re.compile("".join(".*" if c == "*" else "." if c == "?" else re.escape(c) for c in glob) + r"\Z")
+            whole = re.compile(pattern.pattern[:-2] + r"(\[\d+\])?\Z")
+            hits = [n for n in every if pattern.match(n)] or [n for n in every if whole.match(n)]
+            if not hits:
+                raise InputError(f"--record {glob}: no variable matches: {nearest(glob, every)}")
+            chosen += [n for n in hits if n not in chosen]
+        return chosen
+
+    def attributes(self) -> dict[str, Any]:
+        """What a file says of its run."""
+        t = self.trajectory
+        return {
+            "title": self.title, "source": f"crescentlab {__version__}", "circuit": self.design.netlist.name,
+            "solver": t.solver, "status": t.status, "complete": int(t.complete), "error": t.error,
+        }  # fmt: skip
+
+    def to_dataframe(self, record: Sequence[str] = ()) -> pandas.DataFrame:
+        """A data frame indexed by time [s]."""
+        import pandas as pd
+
+        return pd.DataFrame(self.columns(record), index=pd.Index(self.time, name="time"))
+
+    def to_xarray(self, record: Sequence[str] = ()) -> xarray.Dataset:
+        """A data set over the dimension time, units in the attributes."""
+        import xarray as xr
+
+        data = {n: ("time", v, {"units": self.quantity(n).si}) for n, v in self.columns(record).items()}
+        return xr.Dataset(data, coords={"time": ("time", self.time, {"units": "s"})}, attrs=self.attributes())
+
+    def write(self, path: Path, record: Sequence[str] = ()) -> None:
+        """Write a file whose suffix chooses the format: .nc, .csv or .parquet."""
+        columns = self.columns(record)
+        units = {n: self.quantity(n).si for n in columns}
+        write_series(path, self.time, columns, units, self.attributes())
+
+    def plot(self, *names: str, path: Path | str | None = None, title: str | None = None) -> Any:
+        """A matplotlib figure of the variables over time, saved if ``path`` is given."""
+        from crescentlab.plotting import plot_series
+
+        return plot_series(self, list(names), path=Path(path) if path else None, title=title)
+
+    def display_unit(self, quantity: Quantity) -> str:
+        """The unit that the circuit's ``display:`` (or the default) shows a quantity in."""
+        chosen = {**DISPLAY, **self.design.netlist.sections.display}
+        return chosen.get(quantity.name, quantity.si)
+
+
+def _split(name: str) -> tuple[str, int | None]:
+    match = re.fullmatch(r"(.*)\[(\d+)\]", name)
+    return (match[1], int(match[2])) if match else (name, None)
+
+
+def check_target(path: Path) -> None:
+    """Refuse an output file that cannot be written, before the run."""
+    if path.suffix not in SUFFIXES:
+        raise InputError(f"-o {path}: the suffix {path.suffix!r} is none of {', '.join(SUFFIXES)}; write for example -o {path.stem or 'result'}.nc")
+    if not path.parent.is_dir():
+        raise InputError(f"-o {path}: the folder {path.parent} does not exist; make it first")
+
+
+def write_series(path: Path, time: np.ndarray, columns: dict[str, np.ndarray], units: dict[str, str], attributes: dict[str, Any]) -> None:
+    """Write series to a file; the suffix chooses the format."""
+    if path.suffix == ".csv":
+        with path.open("w", newline="", encoding="utf-8") as file:
+            writer = csv.writer(file)
+            writer.writerow(["time [s]", *[f"{n} [{units[n]}]" for n in columns]])
+            for row in zip(time.tolist(), *[v.tolist() for v in columns.values()], strict=True):
+                writer.writerow([repr(v) for v in row])
+    elif path.suffix == ".parquet":
+        _write_parquet(path, time, columns, units, attributes)
+    else:
+        _write_netcdf(path, time, columns, units, attributes)
+
+
+def _write_parquet(path: Path, time: np.ndarray, columns: dict[str, np.ndarray], units: dict[str, str], attributes: dict[str, Any]) -> None:
+    import pyarrow as pa
+    import pyarrow.parquet as pq
+
+    fields = [pa.field("time", pa.float64(), metadata={"units": "s"})]
+    fields += [pa.field(n, pa.float64(), metadata={"units": units[n]}) for n in columns]
+    schema = pa.schema(fields, metadata={k: str(v) for k, v in attributes.items()})
+    pq.write_table(pa.table([time, *columns.values()], schema=schema), path)
+
+
+def _write_netcdf(path: Path, time: np.ndarray, columns: dict[str, np.ndarray], units: dict[str, str], attributes: dict[str, Any]) -> None:
+    import h5netcdf
+
+    with h5netcdf.File(path, "w") as file:
+        file.dimensions = {"time": time.size}
+        for name, unit, series in [("time", "s", time), *[(n, units[n], v) for n, v in columns.items()]]:
+            variable = file.create_variable(name, ("time",), float)
+            variable[:] = series
+            variable.attrs["units"] = unit
+        for key, value in attributes.items():
+            file.attrs[key] = value
+
+
+def read_series(path: Path) -> tuple[np.ndarray, dict[str, np.ndarray], dict[str, str], dict[str, Any]]:
+    """Read a result file back: times, series, units, attributes. Raises :class:`InputError`."""
+    if path.suffix not in SUFFIXES:
+        raise InputError(f"{path}: not a result file; its suffix must be one of {', '.join(SUFFIXES)}")
+    if not path.is_file():
+        raise InputError(f"{path}: no such file; `crescentlab simulate` writes one")
+    try:
+        return {".csv": _read_csv, ".parquet": _read_parquet, ".nc": _read_netcdf}[path.suffix](path)
+    except (OSError, ValueError, KeyError) as error:
+        raise InputError(f"{path}: not a result file of crescentlab ({error})") from None
+
+
+def _read_csv(path: Path) -> tuple[np.ndarray, dict[str, np.ndarray], dict[str, str], dict[str, Any]]:
+    with path.open(newline="", encoding="utf-8") as file:
+        titles = next(csv.reader(file))
+    data = np.loadtxt(path, delimiter=",", skiprows=1, ndmin=2)
+    split = [re.fullmatch(r"(.*) \[(.*)\]", t) for t in titles]
+    if not all(split):
+        raise ValueError("a column title has no unit")
+    names = [m[1] for m in split if m]
+    units = {m[1]: m[2] for m in split if m}
+    return data[:, 0], dict(zip(names[1:], data.T[1:], strict=True)), units, {}
+
+
+def _read_parquet(path: Path) -> tuple[np.ndarray, dict[str, np.ndarray], dict[str, str], dict[str, Any]]:
+    import pyarrow.parquet as pq
+
+    table = pq.read_table(path)
+    units = {f.name: (f.metadata or {}).get(b"units", b"").decode() for f in table.schema}
+    series = {n: table[n].to_numpy() for n in table.column_names}
+    attributes = {k.decode(): v.decode() for k, v in (table.schema.metadata or {}).items()}
+    return series.pop("time"), series, units, attributes
+
+
+def _read_netcdf(path: Path) -> tuple[np.ndarray, dict[str, np.ndarray], dict[str, str], dict[str, Any]]:
+    import h5netcdf
+
+    with h5netcdf.File(path, "r") as file:
+        series = {n: np.array(v[:]) for n, v in file.variables.items()}
+        units = {n: str(v.attrs.get("units", "")) for n, v in file.variables.items()}
+        attributes = {k: v.item() if hasattr(v, "item") else v for k, v in file.attrs.items()}
+    return series.pop("time"), series, units, attributes
+
+
+def quantity_of_unit(unit: str) -> Quantity | None:
+    """The quantity whose SI unit this is."""
+    return next((q for q in QUANTITIES.values() if q.si == unit), None)

@@ -1,0 +1,237 @@
+"""The discrete half of a run: bits settle, events fire in rounds, ticks and time roots are foreseen.
+
+Between stops every bit and held value is constant. At a stop the bits *settle*: outside its
+tolerance band a bit takes its truth, inside it the side its relation is heading for, heading nowhere
+its truth; repeated until still. Then events whose conditions turned true fire, all reading the world
+just before the round, and the bits settle again.
+"""
+
+from __future__ import annotations
+
+from collections import deque
+
+import numpy as np
+
+from crescentlab.errors import SimulationError
+from crescentlab.system import Evaluator, System, Values
+
+EPS = float(np.finfo(float).eps)
+MAX_ROUNDS = 40
+MAX_SETTLING = 200
+ZENO_COUNT = 60
+"""This many firings of one event within ``ZENO_SPAN`` of the run are taken as endless."""
+ZENO_SPAN = 1e-6
+SCAN_POINTS = 20_001
+
+
+class Hybrid:
+    """Bits, held values and conditions of one run."""
+
+    def __init__(self, system: System, values: Values, start: float, stop: float) -> None:
+        self.system = system
+        self.start, self.end = start, stop
+        self.span = stop - start
+        self.bits_info = system.bits
+        self.relation = Evaluator(system.relation, values.p)
+        self.condition = Evaluator(system.condition, values.p)
+        self.n = len(system.bits.names)
+        self.b = np.zeros(self.n)
+        self.h = values.h0.copy()
+        self.holds = np.zeros(system.conditions.numel(), bool)
+        self.p = values.p
+        self.finished = False
+        self.rising = [k for k, e in enumerate(system.events) if e.kind != "every"]
+        self.ticking = [k for k, e in enumerate(system.events) if e.kind == "every"]
+        self.periods = np.array(system.period(values.p)).ravel() if self.ticking else np.zeros(0)
+        if np.any(~(self.periods > 0)):
+            bad = system.events[self.ticking[int(np.argmin(self.periods > 0))]].name
+            raise SimulationError(f"{bad}: its period must be above 0")
+        self.ticked = np.zeros(len(self.ticking), dtype=int)
+        self.remap = Evaluator(_reordered(system), values.p) if system.events else None
+        self.recent: dict[str, deque[float]] = {}
+        self.watched = np.flatnonzero(system.bits.on_state)
+        self.curved = np.flatnonzero(system.bits.on_time & ~system.bits.linear)
+        self.linear = np.flatnonzero(system.bits.linear)
+        self.curved_roots: list[tuple[float, int]] | None = None
+
+    @property
+    def time_tolerance(self) -> float:
+        """How closely roots are located [s]."""
+        return max(1e-13 * self.span, 8 * EPS * max(abs(self.start), abs(self.end)))
+
+    # -- settling --------------------------------------------------------------------------------
+
+    def begin(self, t: float, x: np.ndarray) -> None:
+        """Bits at the start: truth first, then settling."""
+        if self.n:
+            for _ in range(2):
+                g = self.relation(t, x, self.h, self.b)[0]
+                self.b = np.where(self.truth(g), 1.0, 0.0)
+        self.settle(t, x)
+
+    def truth(self, g: np.ndarray) -> np.ndarray:
+        """Truth of each relation: above its boundary, or on it unless strict."""
+        return (g > 0) | ((g == 0) & ~self.bits_info.strict)
+
+    def settle(self, t: float, x: np.ndarray) -> None:
+        """Bring every bit to rest; raises :class:`SimulationError` naming relations that cannot."""
+        if not self.n:
+            return
+        seen: dict[bytes, int] = {}
+        for _ in range(MAX_SETTLING):
+            g, rate, scale = self.relation(t, x, self.h, self.b)
+            roundoff = 16 * EPS * scale
+            inside = np.abs(g) <= 2 * self.time_tolerance * np.abs(rate) + roundoff
+            moving = np.abs(rate) * self.span > roundoff
+            sides = np.where(inside & moving, rate > 0, self.truth(g))
+            new = sides.astype(float)
+            if np.array_equal(new, self.b):
+                return
+            key = new.tobytes()
+            if key in seen:
+                changing = self.bits_info.names[int(np.flatnonzero(new != self.b)[0])]
+                raise SimulationError(
+                    f"both sides push towards the boundary of {changing}; the component needs a mode that rests on it"
+                )
+            seen[key] = 1
+            self.b = new
+        raise SimulationError("the relations do not settle")
+
+    # -- stops -----------------------------------------------------------------------------------
+
+    def stop(self, t: float, x: np.ndarray, due: list[int]) -> tuple[np.ndarray, list[str]]:
+        """Settle and fire at time ``t``; ``due`` are positions of ticks. Returns the state after, names fired."""
+        self.settle(t, x)
+        names: list[str] = []
+        for _ in range(MAX_ROUNDS):
+            fired = self.edges(t, x)
+            fired += [self.ticking[k] for k in due]
+            if not fired:
+                return x, names
+            due = []
+            self.raise_failures(t, x, fired)
+            names += [self.system.events[k].name for k in fired]
+            flags = np.zeros(len(self.system.events))
+            flags[fired] = 1.0
+            assert self.remap is not None
+            new_x, new_h = self.remap(t, x, self.h, self.b, flags)
+            x, held = new_x.copy(), new_h.copy()
+            if not np.array_equal(held, self.h):
+                self.h = held
+                if self.curved.size and self.bits_info.held_dependent[self.curved].any():
+                    self.curved_roots = None
+            self.settle(t, x)
+            self.finished = self.finished or any(self.system.events[k].kind == "stop" for k in fired)
+        raise SimulationError(f"events keep causing each other at one instant: {', '.join(dict.fromkeys(names[-6:]))}")
+
+    def edges(self, t: float, x: np.ndarray) -> list[int]:
+        """Events whose conditions have just turned true."""
+        if not self.rising:
+            return []
+        now = self.condition(t, x, self.h, self.b)[0] > 0.5
+        risen = now & ~self.holds
+        self.holds = now
+        return [self.rising[k] for k in np.flatnonzero(risen)]
+
+    def raise_failures(self, t: float, x: np.ndarray, fired: list[int]) -> None:
+        for k in fired:
+            event = self.system.events[k]
+            if event.kind == "fail":
+                values = np.array(self.system.function_of(event.message_names)(t, x, self.h, self.b, self.p)).ravel() if event.message_names else []
+                shown = {n.rpartition(".")[2]: v for n, v in zip(event.message_names, values, strict=False)}
+                raise SimulationError(event.message.format(**{n: float(v) for n, v in shown.items()}))
+
+    def note(self, t: float, names: list[str]) -> None:
+        """Watch for events that pile up towards an instant (Zeno)."""
+        for name in names:
+            times = self.recent.setdefault(name, deque(maxlen=ZENO_COUNT))
+            times.append(t)
+            if len(times) == ZENO_COUNT and t - times[0] < ZENO_SPAN * self.span:
+                raise SimulationError(
+                    f"{name} happens faster and faster ({ZENO_COUNT} times within {t - times[0]:.2g} s); "
+                    "the part needs a mode in which it rests (for a mass with stops, a larger rest_speed)"
+                )
+
+    # -- what lies ahead -------------------------------------------------------------------------
+
+    def next_tick(self) -> float:
+        """Time of the next tick, or infinity."""
+        return float(np.min(self.start + (self.ticked + 1) * self.periods)) if self.ticking else np.inf
+
+    def due(self, t: float) -> list[int]:
+        """Positions of the ticks that fall on ``t``, counted as done."""
+        times = self.start + (self.ticked + 1) * self.periods
+        hit = np.flatnonzero(times <= t + self.time_tolerance)
+        self.ticked[hit] += 1
+        return [int(k) for k in hit]
+
+    def next_time_root(self, t: float, x: np.ndarray) -> float:
+        """Earliest instant after ``t`` at which a relation on time alone turns, or infinity."""
+        soonest = np.inf
+        if self.linear.size:
+            g, rate, _ = self.relation(t, x, self.h, self.b)
+            for k in self.linear:
+                side = 1.0 if self.b[k] else -1.0
+                if side * rate[k] < 0 and (ahead := -g[k] / rate[k]) > 0:
+                    soonest = min(soonest, t + ahead)
+        if self.curved.size:
+            if self.curved_roots is None:
+                self.curved_roots = self.scan(t, x)
+            for root, _ in self.curved_roots:
+                if root > t + self.time_tolerance:
+                    return min(soonest, root)
+        return float(soonest)
+
+    def scan(self, t: float, x: np.ndarray) -> list[tuple[float, int]]:
+        """All roots ahead of relations that curve in time, found on a fine grid and then closed in on."""
+        times = np.linspace(t, self.end, SCAN_POINTS)
+        columns = self.system.relation(times.reshape(1, -1), x, self.h, self.b, self.p)
+        g, rate = np.array(columns[0])[self.curved], np.array(columns[1])[self.curved]
+        found: list[tuple[float, int]] = []
+        for row, k in enumerate(self.curved):
+            for j in np.flatnonzero(np.sign(g[row, 1:]) != np.sign(g[row, :-1])):
+                found.append((self.close_in(k, times[j], times[j + 1], x), int(k)))
+            dips = (g[row, 1:] * g[row, :-1] > 0) & (rate[row, :-1] * g[row, :-1] < 0) & (rate[row, 1:] * g[row, 1:] > 0)
+            for j in np.flatnonzero(dips):
+                found += [(root, int(k)) for root in self.dip(k, times[j], times[j + 1], x)]
+        return sorted(found)
+
+    def at(self, k: int, t: float, x: np.ndarray) -> tuple[float, float]:
+        g, rate, _ = self.relation(t, x, self.h, self.b)
+        return float(g[k]), float(rate[k])
+
+    def close_in(self, k: int, low: float, high: float, x: np.ndarray) -> float:
+        """The sign change of relation k in [low, high] by bisection."""
+        left = np.sign(self.at(k, low, x)[0])
+        if left == 0:
+            return low
+        while high - low > self.time_tolerance:
+            middle = (low + high) / 2
+            if middle in (low, high):
+                break
+            if np.sign(self.at(k, middle, x)[0]) == left:
+                low = middle
+            else:
+                high = middle
+        return high
+
+    def dip(self, k: int, low: float, high: float, x: np.ndarray) -> list[float]:
+        """Two roots hidden between samples of one sign, if the extremum between them crosses."""
+        side = np.sign(self.at(k, low, x)[0])
+        a, b = low, high
+        while b - a > self.time_tolerance:
+            middle = (a + b) / 2
+            if middle in (a, b):
+                break
+            g, rate = self.at(k, middle, x)
+            if np.sign(g) != side and g != 0:
+                return [self.close_in(k, low, middle, x), self.close_in(k, middle, high, x)]
+            if rate * side < 0:
+                a = middle
+            else:
+                b = middle
+        return []
+
+
+def _reordered(system: System) -> object:
+    return system.remap

@@ -1,0 +1,363 @@
+"""The event loop: one for all steppers. System + numbers -> :class:`Trajectory`."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from crescentlab import units
+from crescentlab.domain import HYDRAULIC
+from crescentlab.errors import SimulationError
+from crescentlab.solvers.hybrid import Hybrid
+from crescentlab.solvers.roots import RootFinder
+from crescentlab.solvers.scipy import Functions, Stepper, stepper
+from crescentlab.solvers.trajectory import GAUSS_NODES, Happening, Pieces, Recording, Statistics, Trajectory
+from crescentlab.system import Evaluator, System, Values
+
+ANGLE_STEP = 0.3
+"""A step turns no angle further than this [rad], so that what depends on it is not stepped over."""
+SMALLEST_STEP = 1e-14
+"""Steps below this share of the span, many in a row, are a collapse."""
+COLLAPSE_COUNT = 500
+CLOCK_POINTS = 4097
+RESTART_SHARE = 0.1
+"""A change of f that moves no state by more than this share of its tolerance over a step needs no restart."""
+
+
+@dataclass(frozen=True)
+class Options:
+    """How to integrate; times in seconds."""
+
+    stop: float
+    start: float = 0.0
+    rtol: float = 1e-6
+    solver: str = "auto"
+    max_step: float | None = None
+    output_step: float | None = None
+
+
+def integrate(system: System, values: Values, options: Options, progress: Callable[[float], None] | None = None) -> Trajectory:
+    """Run the system; failures and interruptions end up in the trajectory's status, nothing is lost."""
+    return _Run(system, values, options, progress).run()
+
+
+class _Run:
+    def __init__(self, system: System, values: Values, options: Options, progress: Callable[[float], None] | None) -> None:
+        self.system, self.values, self.options, self.progress = system, values, options, progress
+        self.functions = Functions(system, values)
+        self.hybrid = Hybrid(system, values, options.start, options.stop)
+        self.roots = RootFinder(self.hybrid)
+        self.atol = options.rtol * system.nominal
+        self.stepper: Stepper = stepper(options.solver, self.functions, options.rtol, self.atol)
+        self.statistics = Statistics()
+        self.steps = Recording()
+        self.grid = Recording() if options.output_step else None
+        self.grid_count = 0
+        self.pieces = Pieces()
+        self.happenings: list[Happening] = []
+        self.warnings: list[str] = []
+        self.angles = np.array([k for k, q in enumerate(system.state_quantities) if q is units.angle], dtype=int)
+        self.limits = _PressureLimits(system)
+        self.step_cap = min(options.max_step or np.inf, self.clock_cap(), (options.stop - options.start) / 50)
+        self.tiny = 0
+        self.shown_at = 0.0
+
+    @property
+    def span(self) -> float:
+        return self.options.stop - self.options.start
+
+    def clock_cap(self) -> float:
+        """A quarter of the shortest swing of any value that depends on time alone."""
+        clock = self.system.clock
+        if not clock.numel():
+            return np.inf
+        import casadi as ca
+
+        rates = ca.Function("clock", self.system.arguments, [ca.jacobian(clock, self.system.t)])
+        times = np.linspace(self.options.start, self.options.stop, CLOCK_POINTS)
+        v = self.values
+        with np.errstate(all="ignore"):
+            rate = np.array(rates(times.reshape(1, -1), v.x0, v.h0, np.zeros(self.system.b.numel()), v.p))
+        turns = np.diff(np.sign(rate), axis=1) != 0
+        gaps = [np.diff(times[1:][row]).min() for row in turns if row.sum() > 1]
+        return min(gaps) / 2 if gaps else np.inf
+
+    # -- the run ---------------------------------------------------------------------------------
+
+    def run(self) -> Trajectory:
+        begun = time.perf_counter()
+        status, error = "done", ""
+        try:
+            self.loop()
+            if self.hybrid.finished:
+                status = "stopped"
+        except SimulationError as problem:
+            status, error = "failed", self.told(str(problem))
+        except KeyboardInterrupt:
+            status, error = "interrupted", f"interrupted at {self.now():.6g} s; what was computed is kept"
+        s = self.statistics
+        s.wall_s = time.perf_counter() - begun
+        s.evaluations, s.jacobians = self.functions.evaluations, self.functions.jacobians
+        if not self.steps.t:
+            self.steps.add(self.options.start, self.values.x0, self.values.h0, np.zeros(self.system.b.numel()))
+        if self.grid is not None and not self.grid.t:
+            self.grid.add(self.steps.t[0], self.steps.x[0], self.steps.h[0], self.steps.b[0])
+        layout = "" if not self.functions.n else f" ({self.stepper.name})"
+        return Trajectory(self.steps, self.grid, self.happenings, s, self.options.solver + layout, self.pieces, status, error, self.warnings)
+
+    def now(self) -> float:
+        return self.steps.t[-1] if self.steps.t else self.options.start
+
+    def told(self, problem: str) -> str:
+        return f"the run ended at {self.now():.6g} s of {self.options.stop:.6g} s: {problem}"
+
+    def loop(self) -> None:
+        o, hybrid = self.options, self.hybrid
+        t, x = o.start, self.values.x0.copy()
+        if not np.all(np.isfinite(self.functions.rhs(t, x))):
+            self.check_finite(t, x, self.functions.rhs(t, x), "at the start")
+        hybrid.begin(t, x)
+        self.sync()
+        x, names = hybrid.stop(t, x, [])
+        self.sync()
+        self.booked(t, names)
+        self.record(t, x)
+        x = self.started(t, x)
+        while t < o.stop and not hybrid.finished:
+            goal = min(o.stop, hybrid.next_tick(), hybrid.next_time_root(t, x))
+            t, x = self.to_goal(t, x, goal)
+            self.report(t)
+        if self.grid is not None:
+            self.finish_grid(t, x)
+
+    def started(self, t: float, x: np.ndarray) -> np.ndarray:
+        """Restart the stepper at (t, x)."""
+        self.check_finite(t, x, self.functions.rhs(t, x), "")
+        self.stepper.restart(t, x, self.options.stop)
+        self.roots.begin(t, x)
+        return x
+
+    def sync(self) -> None:
+        """Let f see the present held values and bits."""
+        self.functions.h, self.functions.b = self.hybrid.h, self.hybrid.b
+
+    def to_goal(self, t: float, x: np.ndarray, goal: float) -> tuple[float, np.ndarray]:
+        """Step until the goal or an event in between; handle it; return where we are then."""
+        while True:
+            bound = min(goal, t + self.cap(t, x))
+            if goal - bound < 1e-9 * (goal - t):
+                bound = goal
+            self.step(bound)
+            low, high, x_high = t, self.stepper.t, self.stepper.x
+            self.check_step(low, high, x_high)
+            event = self.roots.first(low, high, x_high, self.stepper.interpolant)
+            self.fill(low, high if event is None else event)
+            if event is not None:
+                return self.inside(event, high, x_high)
+            if high >= goal - self.hybrid.time_tolerance:
+                return self.at_goal(goal, x_high)
+            self.record(high, x_high)
+            t, x = high, x_high
+            self.report(t)
+
+    def cap(self, t: float, x: np.ndarray) -> float:
+        """Longest step from here."""
+        cap = self.step_cap
+        if self.angles.size:
+            fastest = np.abs(self.functions.f(t, x, self.functions.h, self.functions.b)[0][self.angles]).max()
+            if fastest > 0:
+                cap = min(cap, ANGLE_STEP / fastest)
+        return float(cap)
+
+    def step(self, bound: float) -> None:
+        try:
+            self.stepper.step(bound)
+        except SimulationError as problem:
+            t, x = self.stepper.t, self.stepper.x
+            self.check_finite(t, x, self.functions.rhs(t, x), "")
+            raise SimulationError(f"no step is small enough ({problem}); {self.blame(t, x)}") from None
+        self.statistics.steps += 1
+
+    def inside(self, t: float, high: float, x_high: np.ndarray) -> tuple[float, np.ndarray]:
+        """An event inside the last step, at t <= high."""
+        path = self.stepper.interpolant()
+        x = np.array(path(t)) if t < high else x_high
+        x_after, kept = self.handle(t, x, [])
+        if kept and t < high:
+            kept = not self.f_differs(high, x_high)
+            if kept and not self.hybrid.finished:
+                self.roots.begin(t, x_after)
+                event = self.roots.first(t, high, x_high, self.stepper.interpolant)
+                self.fill(t, high if event is None else event)
+                if event is not None:
+                    return self.inside(event, high, x_high)
+                self.record(high, x_high)
+                return high, x_high
+        if not kept and not self.hybrid.finished:
+            self.statistics.restarts += 1
+            self.started(t, x_after)
+        return t, x_after
+
+    def at_goal(self, t: float, x: np.ndarray) -> tuple[float, np.ndarray]:
+        """The goal of the last step: ticks, time events, or the end."""
+        due = self.hybrid.due(t)
+        x_after, kept = self.handle(t, x, due)
+        if not kept and not self.hybrid.finished and t < self.options.stop:
+            self.statistics.restarts += 1
+            self.started(t, x_after)
+        else:
+            self.roots.begin(t, x_after)
+        return t, x_after
+
+    def handle(self, t: float, x: np.ndarray, due: list[int]) -> tuple[np.ndarray, bool]:
+        """Settle and fire at t; record before and after; say whether the stepper may go on as it is."""
+        hybrid = self.hybrid
+        h, b = hybrid.h, hybrid.b
+        self.old_h, self.old_b = h, b
+        self.record(t, x)
+        x_after, names = hybrid.stop(t, x, due)
+        changed = x_after is not x or hybrid.h is not h or not np.array_equal(hybrid.b, b)
+        self.sync()
+        self.booked(t, names)
+        if not changed:
+            return x, True
+        jumped = x_after is not x and not np.array_equal(x_after, x)
+        self.check_finite(t, x_after, x_after, "after an event")
+        self.record(t, x_after, jump=True)
+        return x_after, not jumped and not self.f_differs(t, x_after)
+
+    def f_differs(self, t: float, x: np.ndarray) -> bool:
+        """Whether f with the new bits and held values differs from f with the old ones by a share of the tolerance."""
+        if not self.functions.n:
+            return False
+        new = self.functions.rhs(t, x)
+        old = self.functions.f(t, x, self.old_h, self.old_b)[0]
+        step = self.stepper.step_size or 0.0
+        return bool(np.any(np.abs(new - old) * step > RESTART_SHARE * (self.atol + self.options.rtol * np.abs(x))))
+
+    # -- books -----------------------------------------------------------------------------------
+
+    def booked(self, t: float, names: list[str]) -> None:
+        if not names:
+            return
+        ticks = {e.name for e in self.system.events if e.kind == "every"} if self.hybrid.ticking else set()
+        events = [n for n in names if n not in ticks]
+        self.statistics.ticks += len(names) - len(events)
+        self.statistics.events += len(events)
+        self.happenings.append(Happening(t, tuple(names)))
+        self.hybrid.note(t, events)
+
+    def record(self, t: float, x: np.ndarray, *, jump: bool = False) -> None:
+        if not jump and self.steps.t and self.steps.t[-1] == t and np.array_equal(self.steps.x[-1], x):
+            return
+        self.steps.add(t, x, self.hybrid.h, self.hybrid.b, jump=jump)
+
+    def fill(self, low: float, high: float) -> None:
+        """Keep what lies inside the smooth piece [low, high]: Gauss nodes, and output points in [low, high)."""
+        if high > low:
+            states = self.stepper.sample(low + GAUSS_NODES * (high - low))
+            self.pieces.add(low, high, states, self.hybrid.h, self.hybrid.b)
+        if self.grid is None:
+            return
+        assert self.options.output_step is not None
+        path = None
+        while (t := self.options.start + self.grid_count * self.options.output_step) < high - self.hybrid.time_tolerance:
+            if t >= low - self.hybrid.time_tolerance:
+                path = path or self.stepper.interpolant()
+                inside = min(max(t, low), high)
+                x = self.steps.x[-1] if inside - low <= self.hybrid.time_tolerance else np.array(path(inside))
+                self.grid.add(t, x, self.hybrid.h, self.hybrid.b)
+            self.grid_count += 1
+
+    def finish_grid(self, t: float, x: np.ndarray) -> None:
+        assert self.grid is not None and self.options.output_step is not None
+        if not self.grid.t or t > self.grid.t[-1] + self.hybrid.time_tolerance:
+            self.grid.add(t, x, self.hybrid.h, self.hybrid.b)
+
+    def report(self, t: float) -> None:
+        if self.progress is not None and (now := time.perf_counter()) - self.shown_at > 0.1:
+            self.shown_at = now
+            self.progress((t - self.options.start) / self.span)
+
+    # -- checks ----------------------------------------------------------------------------------
+
+    def check_step(self, low: float, high: float, x: np.ndarray) -> None:
+        if not np.all(np.isfinite(x)):
+            self.check_finite(high, x, x, "")
+        if high - low < SMALLEST_STEP * self.span:
+            self.tiny += 1
+            if self.tiny > COLLAPSE_COUNT:
+                raise SimulationError(f"the step size collapsed to {high - low:.2g} s; {self.blame(high, x)}")
+        else:
+            self.tiny = 0
+        warning = self.limits.check(high, x, self.hybrid.h)
+        if warning and warning not in self.warnings:
+            self.warnings.append(warning)
+
+    def check_finite(self, t: float, x: np.ndarray, values: np.ndarray, when: str) -> None:
+        bad = np.flatnonzero(~np.isfinite(values))
+        if bad.size:
+            name = self.system.state_names[int(bad[0])]
+            what = "is no longer a finite number" if values is x else "has a rate that is not a finite number"
+            raise SimulationError(
+                f"{name} {what} {when + ' ' if when else ''}(t = {t:.6g} s); look at the parameters of {name.rpartition('.')[0]} and at the start values"
+            )
+
+    def blame(self, t: float, x: np.ndarray) -> str:
+        """The state whose rate changes fastest against its tolerance."""
+        f = self.functions.rhs(t, x)
+        matrix = self.system.jacobian(t, x, self.functions.h, self.functions.b, self.values.p).sparse()
+        change = np.abs(matrix @ f) / (self.atol + self.options.rtol * np.abs(x))
+        name = self.system.state_names[int(np.nanargmax(change))] if change.size and np.isfinite(change).any() else "unknown"
+        return f"{name} limits it; try --solver bdf, a larger volume or mass there, or smoother signals"
+
+
+class _PressureLimits:
+    """Pressures below absolute zero end a run, or warn where the fluid may be under tension."""
+
+    def __init__(self, system: System) -> None:
+        self.system = system
+        self.states = self.of(system.state_names, system.state_quantities)
+        self.held = self.of(system.held_names, system.held_quantities)
+
+    def of(self, names: list[str], quantities: list[units.Quantity]) -> list[tuple[np.ndarray, np.ndarray, list[str], list[bool]]]:
+        plan = self.system.plan
+        places, floors, shown, tension = [], [], [], []
+        for k, (name, quantity) in enumerate(zip(names, quantities, strict=True)):
+            owner = name.rpartition(".")[0]
+            if quantity is not units.pressure or not any(p.domain is HYDRAULIC for p in type(plan.components[owner]).ports()):
+                continue
+            if not plan.fluids[owner]:
+                continue
+            fluid = plan.design.fluids[plan.fluids[owner][0]]
+            places.append(k)
+            floors.append(-fluid.atmospheric_pressure)
+            shown.append(name)
+            tension.append(fluid.tension)
+        return [(np.array(places, dtype=int), np.array(floors), shown, tension)]
+
+    def check(self, t: float, x: np.ndarray, h: np.ndarray) -> str | None:
+        """A warning, or an error raised; None if all pressures are possible."""
+        for vector, groups in ((x, self.states), (h, self.held)):
+            for places, floors, names, tension in groups:
+                if not places.size:
+                    continue
+                below = vector[places] < floors * (1 + 1e-9)
+                if below.any():
+                    k = int(np.flatnonzero(below)[0])
+                    said = (
+                        f"{names[k]} is {units.pressure.show(vector[places][k], 'bar')} gauge at {t:.6g} s, below absolute zero "
+                        f"({units.pressure.show(floors[k], 'bar')})"
+                    )
+                    if not tension[k]:
+                        raise SimulationError(
+                            f"{said}; the oil would cavitate: feed this volume better, or write tension: true in the fluid to go on"
+                        )
+                    return said
+        return None
+
+
+__all__ = ["Evaluator", "Options", "integrate"]

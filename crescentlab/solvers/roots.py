@@ -1,0 +1,115 @@
+"""Finds the first root of the watched relations inside a step, on the solver's interpolant."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+from scipy.optimize import brentq
+
+from crescentlab.solvers.hybrid import EPS, Hybrid
+
+_S = np.linspace(0.0, 1.0, 17)[1:-1]
+_H00, _H10 = 2 * _S**3 - 3 * _S**2 + 1, _S**3 - 2 * _S**2 + _S
+_H01, _H11 = -2 * _S**3 + 3 * _S**2, _S**3 - _S**2
+
+Interpolant = Callable[[float], np.ndarray]
+
+
+class RootFinder:
+    """Watches the relations on states; keeps their values at the end of the last step."""
+
+    def __init__(self, hybrid: Hybrid) -> None:
+        self.hybrid = hybrid
+        self.watched = hybrid.watched
+        self.g = np.zeros(self.watched.size)
+        self.rate = np.zeros(self.watched.size)
+
+    def sides(self) -> np.ndarray:
+        """+1 where a watched bit is true, -1 where it is false."""
+        return np.where(self.hybrid.b[self.watched] > 0.5, 1.0, -1.0)
+
+    def read(self, t: float, x: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Values, rates and roundoff of the watched relations."""
+        g, rate, scale = self.hybrid.relation(t, x, self.hybrid.h, self.hybrid.b)
+        w = self.watched
+        return g[w], rate[w], 16 * EPS * scale[w]
+
+    def begin(self, t: float, x: np.ndarray) -> None:
+        """Remember the values at the beginning of a step."""
+        if self.watched.size:
+            self.g, self.rate, _ = self.read(t, x)
+
+    def first(self, low: float, high: float, x_high: np.ndarray, interpolant: Callable[[], Interpolant]) -> float | None:
+        """Earliest time in (low, high] at which a relation has left its side, or None.
+
+        Values at ``low`` are those of the last :meth:`begin`; if there is no root, those at ``high``
+        take their place.
+        """
+        if not self.watched.size:
+            return None
+        g, rate, band = self.read(high, x_high)
+        side = self.sides()
+        before, after = side * self.g, side * g
+        suspects = after < -band
+        dips = self.dips(before, after, side * self.rate * (high - low), side * rate * (high - low), band)
+        if not (suspects.any() or dips.any()):
+            self.g, self.rate = g, rate
+            return None
+        path = interpolant()
+        found = [r for k in np.flatnonzero(suspects | dips) if (r := self.locate(int(k), low, high, side[k], path)) is not None]
+        if not found:
+            self.g, self.rate = g, rate
+            return None
+        return min(found)
+
+    def dips(self, before: np.ndarray, after: np.ndarray, slope0: np.ndarray, slope1: np.ndarray, band: np.ndarray) -> np.ndarray:
+        """Relations of one side at both ends whose cubic through values and slopes comes near zero."""
+        possible = (before > band) & (after >= -band) & (slope0 < 0) & (slope1 > 0)
+        if not possible.any():
+            return possible
+        k = np.flatnonzero(possible)
+        cubic = np.outer(before[k], _H00) + np.outer(slope0[k], _H10) + np.outer(after[k], _H01) + np.outer(slope1[k], _H11)
+        result = np.zeros_like(possible)
+        result[k] = cubic.min(axis=1) <= 0.02 * (before[k] + np.abs(after[k]))
+        return result
+
+    def locate(self, k: int, low: float, high: float, side: float, path: Interpolant) -> float | None:
+        """The first time relation k is on the other side, as closely as the clock allows."""
+        place = self.watched[k]
+
+        def value(t: float) -> float:
+            g, _, scale = self.hybrid.relation(t, path(t), self.hybrid.h, self.hybrid.b)
+            return float(side * g[place] + 16 * EPS * scale[place])
+
+        times = np.concatenate(([low], low + _S * (high - low), [high]))
+        values = np.array([value(t) for t in times])
+        wrong = values < 0
+        if not wrong.any():
+            return self.shallow(value, times, values)
+        right = np.flatnonzero(~wrong)
+        first_right = int(right[0]) if right.size else None
+        if first_right is None:
+            return low  # on the wrong side all along: it turns at once
+        later = np.flatnonzero(wrong & (np.arange(times.size) > first_right))
+        if not later.size:
+            return None  # it came back to its side and stays there
+        j = int(later[0])
+        return self.close(value, float(times[j - 1]), float(times[j]))
+
+    def shallow(self, value: Callable[[float], float], times: np.ndarray, values: np.ndarray) -> float | None:
+        """A dip between samples: look closer around the smallest sample."""
+        j = int(np.argmin(values))
+        fine = np.linspace(times[max(j - 1, 0)], times[min(j + 1, times.size - 1)], 33)
+        inner = np.array([value(t) for t in fine])
+        crossed = np.flatnonzero(inner < 0)
+        return self.close(value, float(fine[crossed[0] - 1]), float(fine[crossed[0]])) if crossed.size and crossed[0] > 0 else None
+
+    def close(self, value: Callable[[float], float], low: float, high: float) -> float:
+        tolerance = self.hybrid.time_tolerance
+        if high - low <= tolerance:
+            return high
+        root = float(brentq(value, low, high, xtol=tolerance, rtol=4 * EPS))
+        while root < high and value(root) >= 0:
+            root = min(high, root + tolerance)
+        return root

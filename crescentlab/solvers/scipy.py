@@ -1,0 +1,240 @@
+"""SciPy's steppers behind one interface: step up to a bound, interpolate, restart.
+
+LSODA keeps a critical time of its own (``rwork[0]``) that must move with the bound; that private
+detail lives in :class:`_Lsoda` and nowhere else.
+"""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+from scipy import integrate, sparse
+from scipy.sparse.csgraph import reverse_cuthill_mckee
+
+from crescentlab.errors import SimulationError
+from crescentlab.system import Evaluator, System, Values
+
+DENSE_LIMIT = 80
+"""Up to this many states LSODA with a full matrix is used by ``auto``."""
+BAND_SHARE = 0.25
+"""A reordered matrix whose band is narrower than this share of n is integrated as banded."""
+BAND_LIMIT = 120
+
+METHODS: dict[str, Any] = {
+    "bdf": integrate.BDF, "radau": integrate.Radau, "rk45": integrate.RK45, "dop853": integrate.DOP853, "lsoda": integrate.LSODA,
+}  # fmt: skip
+
+
+class Functions:
+    """f and its Jacobian of one run, with the current held values and bits."""
+
+    def __init__(self, system: System, values: Values) -> None:
+        self.n = values.x0.size
+        self.f = Evaluator(system.rhs, values.p)
+        self.system, self.values = system, values
+        self._jacobian: Evaluator | None = None
+        self.h = values.h0
+        self.b = np.zeros(system.b.numel())
+        self.evaluations = 0
+        self.jacobians = 0
+
+    def rhs(self, t: float, x: np.ndarray) -> np.ndarray:
+        """f(t, x), shape (n,)."""
+        self.evaluations += 1
+        return self.f(t, x, self.h, self.b)[0].copy()
+
+    @property
+    def pattern(self) -> sparse.csc_matrix:
+        """Sparsity of the Jacobian."""
+        pattern = self.system.jacobian.sparsity_out(0)
+        rows, start = np.array(pattern.row()), np.array(pattern.colind())
+        return sparse.csc_matrix((np.ones(rows.size), rows, start), shape=(self.n, self.n))
+
+    def nonzeros(self, t: float, x: np.ndarray) -> np.ndarray:
+        """Nonzeros of the Jacobian in column order."""
+        if self._jacobian is None:
+            self._jacobian = Evaluator(self.system.jacobian, self.values.p)
+        self.jacobians += 1
+        return self._jacobian(t, x, self.h, self.b)[0]
+
+
+class Stepper:
+    """One SciPy solver that can be restarted and sent past its bound."""
+
+    def __init__(self, name: str, functions: Functions, rtol: float, atol: np.ndarray, layout: str) -> None:
+        self.name, self.functions = name, functions
+        self.rtol, self.atol = max(rtol, 100 * np.finfo(float).eps), atol
+        self.order: np.ndarray | None = None
+        self.solver: Any = None
+        self.options: dict[str, Any] = {}
+        self.rhs: Callable[[float, np.ndarray], np.ndarray] = functions.rhs
+        self.step_size: float | None = None
+        if name in ("bdf", "radau", "lsoda") and functions.n:
+            self.options["jac"] = {"sparse": self.sparse, "dense": self.dense, "banded": self.banded}[layout]
+        if layout != "sparse" and functions.n:
+            pattern = functions.pattern
+            self.rows = pattern.indices
+            self.columns = np.repeat(np.arange(functions.n), np.diff(pattern.indptr))
+        else:
+            self.structure = functions.pattern
+        if layout == "banded":
+            self.set_band(functions.pattern)
+
+    def set_band(self, pattern: sparse.csc_matrix) -> None:
+        order, lower, upper = banded(pattern)
+        self.order, self.lower, self.upper = order, lower, upper
+        place = np.argsort(order)
+        self.rows, self.columns = place[self.rows], place[self.columns]
+        back = place
+        f = self.functions.rhs
+        self.rhs = lambda t, y: f(t, y[back])[order]
+        self.atol = self.atol[order]
+        self.options.update(lband=lower, uband=upper)
+
+    def inner(self, x: np.ndarray) -> np.ndarray:
+        return x if self.order is None else x[self.order]
+
+    def outer(self, y: np.ndarray) -> np.ndarray:
+        if self.order is None:
+            return y
+        x = np.empty_like(y)
+        x[self.order] = y
+        return x
+
+    def dense(self, t: float, x: np.ndarray) -> np.ndarray:
+        matrix = np.zeros((self.functions.n, self.functions.n))
+        matrix[self.rows, self.columns] = self.functions.nonzeros(t, x)
+        return matrix
+
+    def banded(self, t: float, y: np.ndarray) -> np.ndarray:
+        packed = np.zeros((self.lower + self.upper + 1, self.functions.n))
+        packed[self.rows - self.columns + self.upper, self.columns] = self.functions.nonzeros(t, self.outer(y))
+        return packed
+
+    def sparse(self, t: float, x: np.ndarray) -> sparse.csc_matrix:
+        s = self.structure
+        return sparse.csc_matrix((self.functions.nonzeros(t, x).copy(), s.indices, s.indptr), shape=s.shape)
+
+    def restart(self, t: float, x: np.ndarray, bound: float) -> None:
+        """Begin anew at (t, x). One-step methods keep their step size."""
+        options = dict(self.options)
+        if self.step_size and self.name in ("rk45", "dop853", "radau"):
+            options["first_step"] = min(self.step_size, bound - t)
+        self.solver = METHODS[self.name](self.rhs, t, self.inner(x), bound, rtol=self.rtol, atol=self.atol, **options)
+
+    @property
+    def t(self) -> float:
+        return float(self.solver.t)
+
+    @property
+    def x(self) -> np.ndarray:
+        return self.outer(self.solver.y)
+
+    def step(self, bound: float) -> None:
+        """One accepted step, not past ``bound``; raises :class:`SimulationError` if none is found."""
+        solver = self.solver
+        solver.t_bound = bound
+        solver.status = "running"
+        before = solver.t
+        self.set_bound(bound)
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            message = solver.step()
+        if solver.status == "failed":
+            raise SimulationError(str(message))
+        # a step cut short by the bound says nothing about the step the error would allow
+        if solver.t < bound or self.step_size is None:
+            self.step_size = solver.t - before
+
+    def set_bound(self, bound: float) -> None:
+        """Tell the solver's private parts about the bound."""
+
+    def sample(self, times: np.ndarray) -> np.ndarray:
+        """States at times within the last step, shape (times, n)."""
+        states = self.solver.dense_output()(times).T
+        return states if self.order is None else states[:, np.argsort(self.order)]
+
+    def interpolant(self) -> Callable[[float], np.ndarray]:
+        """x(t) within the last step."""
+        dense = self.solver.dense_output()
+        return dense if self.order is None else (lambda t: self.outer(dense(t)))
+
+
+class _Lsoda(Stepper):
+    """LSODA's critical time follows the bound, so a continued run never overshoots it."""
+
+    def set_bound(self, bound: float) -> None:
+        self.solver._lsoda_solver._integrator.rwork[0] = bound
+
+    def sample(self, times: np.ndarray) -> np.ndarray:
+        # the Nordsieck polynomial read in place: a tenth of the cost of a dense_output object
+        integrator = self.solver._lsoda_solver._integrator
+        work, order, n = integrator.rwork, int(integrator.iwork[13]), self.functions.n
+        history = work[20 : 20 + (order + 1) * n].reshape(order + 1, n)
+        powers = ((times - self.solver.t) / work[11])[:, None] ** np.arange(order + 1)
+        if integrator.iwork[14] < order:
+            powers[:, -1] *= (work[11] / work[10]) ** order
+        states = powers @ history
+        return states if self.order is None else states[:, np.argsort(self.order)]
+
+
+class _Stateless(Stepper):
+    """A circuit without states: every step reaches the bound."""
+
+    def restart(self, t: float, x: np.ndarray, bound: float) -> None:
+        self.at, self.state = t, x
+
+    @property
+    def t(self) -> float:
+        return self.at
+
+    @property
+    def x(self) -> np.ndarray:
+        return self.state
+
+    def step(self, bound: float) -> None:
+        self.step_size = bound - self.at
+        self.at = bound
+
+    def sample(self, times: np.ndarray) -> np.ndarray:
+        return np.tile(self.state, (times.size, 1))
+
+    def interpolant(self) -> Callable[[float], np.ndarray]:
+        return lambda _: self.state
+
+
+def banded(pattern: sparse.csc_matrix) -> tuple[np.ndarray, int, int]:
+    """Order of states that narrows the band (reverse Cuthill-McKee), and its lower and upper width."""
+    order = np.asarray(reverse_cuthill_mckee(sparse.csr_matrix(pattern + pattern.T), symmetric_mode=True))
+    place = np.argsort(order)
+    coo = pattern.tocoo()
+    distance = place[coo.row] - place[coo.col]
+    return order, int(max(distance.max(initial=0), 0)), int(max(-distance.min(initial=0), 0))
+
+
+def choose(name: str, functions: Functions) -> tuple[str, str]:
+    """Method and matrix layout for ``name``; ``auto`` decides by size and by the band after reordering."""
+    n = functions.n
+    if name in ("rk45", "dop853"):
+        return name, "dense"
+    if name in ("bdf", "radau"):
+        return name, "sparse" if n > DENSE_LIMIT else "dense"
+    if n <= DENSE_LIMIT:
+        return "lsoda", "dense"
+    _, lower, upper = banded(functions.pattern)
+    width = lower + upper + 1
+    if width <= BAND_SHARE * n and width <= BAND_LIMIT:
+        return "lsoda", "banded"
+    return ("bdf", "sparse") if name == "auto" else ("lsoda", "dense")
+
+
+def stepper(name: str, functions: Functions, rtol: float, atol: np.ndarray) -> Stepper:
+    """The stepper that ``--solver NAME`` means for this system."""
+    if functions.n == 0:
+        return _Stateless("rk45", functions, rtol, atol, "dense")
+    method, layout = choose(name, functions)
+    kind = _Lsoda if method == "lsoda" else Stepper
+    return kind(method, functions, rtol, atol, layout)
