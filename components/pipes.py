@@ -8,7 +8,7 @@ from crescentlab.component import Component, Equations
 from crescentlab.domain import gives_pressure, state, stores, takes_pressure, undecided_pressure
 from crescentlab.fluid import Fluid
 from crescentlab.maths import Expr, pi
-from crescentlab.units import Flow, Length, Pressure, Ratio
+from crescentlab.units import Flow, Length, Pressure, PressureDifference, Ratio
 
 from .flow_laws import pipe_friction_drop
 
@@ -105,7 +105,7 @@ class PipeCapacitiveCapacitive(Pipe):
 
     a = gives_pressure("first end")
     b = gives_pressure("second end")
-    drop = state(Pressure, "pressure at a less pressure at b", start=0.0, nominal=1e5)
+    drop = state(PressureDifference, "pressure at a less pressure at b", start=0.0, nominal=1e5)
 
     def equations(self, q_a: Expr, q_b: Expr, p: Expr, q: Expr, drop: Expr, fluid: Fluid) -> Equations:
         p_1, p_2 = p + drop / 2, p - drop / 2

@@ -428,6 +428,9 @@ def _plain(node: Node, info: Any, lookup: Any, subject: str) -> Any:
         quantity = field_quantity(info)
         if isinstance(value.value, str):
             return value.value
+        if quantity is None and not is_structural(info):
+            # a number whose quantity the component itself decides: its reader wants the unit
+            return f"{float(value.value)!r} {value.quantity.si if value.quantity.name != 'ratio' else ''}".strip()
         if quantity is None:
             if value.dims != QUANTITIES["ratio"].dims:
                 raise ExpressionError(f"the expression gives {value.quantity.title} [{value.quantity.si}], where a plain number or word belongs")

@@ -398,8 +398,9 @@ class _Assembly:
             nx = trace.states.size
             for event in trace.events:
                 if event.remap is not None:
-                    both = event.remap(self.t, xs, hs, bs, self.inputs[name], ps, pf)
-                    xs, hs = (ca.if_else(fired[at], both[:nx], xs), ca.if_else(fired[at], both[nx:], hs))
+                    after = event.remap(self.t, xs, hs, bs, self.inputs[name], ps, pf)
+                    both = ca.if_else(fired[at], after, ca.vertcat(xs, hs))
+                    xs, hs = ca.vertsplit(both, [0, nx, both.numel()])
                 at += 1
             new_x.append(xs)
             new_h.append(hs)

@@ -156,6 +156,7 @@ _DISPLACEMENT_UNITS = {
 
 ratio = _quantity("ratio", "1", NO_DIMS, 1.0, {"": 1.0, "1": 1.0, "%": 1e-2, "-": 1.0, "ppm": 1e-6})
 pressure = _quantity("pressure", "Pa", (1, -1, -2, 0), _BAR, _PRESSURE_UNITS)
+pressure_difference = _quantity("pressure_difference", "Pa", (1, -1, -2, 0), _BAR, _PRESSURE_UNITS)
 flow = _quantity("flow", "m^3/s", (0, 3, -1, 0), _LPM, _FLOW_UNITS)
 volume = _quantity("volume", "m^3", (0, 3, 0, 0), 1e-6, _VOLUME_UNITS)
 displacement = _quantity("displacement", "m^3/rad", (0, 3, 0, 0), 1e-6, _DISPLACEMENT_UNITS)
@@ -218,6 +219,8 @@ flow_rate_of_change = _quantity("flow_rate_of_change", "m^3/s^2", (0, 3, -2, 0),
 
 Ratio = Annotated[float, ratio]
 Pressure = Annotated[float, pressure]
+PressureDifference = Annotated[float, pressure_difference]
+"""A pressure less another: may lie below absolute zero."""
 Flow = Annotated[float, flow]
 Volume = Annotated[float, volume]
 Displacement = Annotated[float, displacement]

@@ -47,7 +47,7 @@ class Hybrid:
             bad = system.events[self.ticking[int(np.argmin(self.periods > 0))]].name
             raise SimulationError(f"{bad}: its period must be above 0")
         self.ticked = np.zeros(len(self.ticking), dtype=int)
-        self.remap = Evaluator(_reordered(system), values.p) if system.events else None
+        self.remap = Evaluator(system.remap, values.p) if system.events else None
         self.recent: dict[str, deque[float]] = {}
         self.watched = np.flatnonzero(system.bits.on_state)
         self.curved = np.flatnonzero(system.bits.on_time & ~system.bits.linear)
@@ -232,6 +232,3 @@ class Hybrid:
                 b = middle
         return []
 
-
-def _reordered(system: System) -> object:
-    return system.remap
