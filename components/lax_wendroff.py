@@ -14,13 +14,14 @@ from crescentlab.units import Flow, Length, Pressure, Ratio, Time, Volume
 
 from .flow_laws import pipe_friction_drop
 from .wave_laws import (
+    Between,
     Wave,
     arriving_wave,
+    closing_flux,
     end_flow,
     end_pressure,
-    lax_wendroff_step,
-    pressure_of_density,
-    share_out,
+    full_step,
+    half_step,
     wave_speed,
 )
 
@@ -117,10 +118,9 @@ class LaxWendroffLine(Component):
 
     def waves(self, p: Expr, q: Expr, elapsed: Expr, fluid: Fluid) -> tuple[Wave, Wave]:
         """The waves arriving at a and at b, `elapsed` [s] after the nodes' values p and q were taken."""
-        to_a = arriving_wave((p[0], p[1], p[2]), (q[0], q[1], q[2]), elapsed, self.cell, self.friction(fluid), fluid)
-        to_b = arriving_wave(
-            (p[-1], p[-2], p[-3]), (-q[-1], -q[-2], -q[-3]), elapsed, self.cell, self.friction(fluid), fluid
-        )
+        friction = self.friction(fluid)
+        to_a = arriving_wave((p[0], p[1]), (q[0], q[1]), elapsed, self.cell, friction, fluid)
+        to_b = arriving_wave((p[-1], p[-2]), (-q[-1], -q[-2]), elapsed, self.cell, friction, fluid)
         return to_a, to_b
 
     def flow_at_a(self, p: Expr, wave: Wave, fluid: Fluid) -> Any:
@@ -144,20 +144,24 @@ class LaxWendroffLine(Component):
         p_a: Expr, q_a: Expr, p_b: Expr, q_b: Expr, t: Expr, fluid: Fluid,
     ) -> Equations:  # fmt: skip
         """What all forms share: the fluid taken in, what the nodes hold, and how they step."""
-        rho_0, area, dx, friction = fluid.rho_0, self.area, self.cell, self.friction(fluid)
+        area, dx = self.area, self.cell
         dt = self.courant_number * dx / wave_speed(self.max_pressure, fluid)
-        r = fluid.density(p_node) / rho_0
         taken_a, taken_b = into_a - had_a, into_b - had_b
+        p_first, q_first = p_a - self.entry_loss(fluid) * q_a * fabs(q_a), q_a
+        p_last, q_last = p_b, -q_b
 
-        step = lax_wendroff_step(p_node, q_node, dt, dx, area, friction, fluid)
-        p_first, p_last = p_a - self.entry_loss(fluid) * q_a * fabs(q_a), p_b
-        gained_a = area * dx / 2 * (fluid.density(p_first) / rho_0 - r[0])
-        gained_b = area * dx / 2 * (fluid.density(p_last) / rho_0 - r[-1])
-        over_a = taken_a - dt * step.q_between[0] - gained_a
-        over_b = taken_b + dt * step.q_between[-1] - gained_b
-        r_inner = step.r + share_out(over_a, over_b, self.nodes - 2) / (area * dx)
-        p_inner = pressure_of_density(r_inner * rho_0, p_node[1:-1], fluid)
+        half = half_step(p_node, q_node, dt, dx, area, self.friction(fluid), fluid)
+        to_a, to_b = self.waves(p_node, q_node, dt / 2, fluid)
+        q_in, p_in = closing_flux(
+            p_node[0], q_node[0], p_first, q_first, taken_a, to_a, half.g[0], dt, dx, area, fluid
+        )  # fmt: skip
+        q_out, p_out = closing_flux(
+            p_node[-1], -q_node[-1], p_last, -q_last, taken_b, to_b, -half.g[-1], dt, dx, area, fluid
+        )  # fmt: skip
+        between = Between(stack(q_in, half.q[1:-1], -q_out), stack(p_in, half.p[1:-1], p_out), half.g)
+        p_inner, q_inner = full_step(p_node, q_node, between, dt, dx, area, fluid)
 
+        r = fluid.density(p_node) / fluid.rho_0
         return {
             "der_into_a": q_a,
             "der_into_b": q_b,
@@ -168,7 +172,7 @@ class LaxWendroffLine(Component):
             "tick": every(
                 dt,
                 p_node=stack(p_first, p_inner, p_last),
-                q_node=stack(q_a, step.q, -q_b),
+                q_node=stack(q_first, q_inner, q_last),
                 t_node=t,
                 had_a=into_a,
                 had_b=into_b,

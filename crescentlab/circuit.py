@@ -8,21 +8,29 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Mapping
+from dataclasses import replace
 from importlib import resources
 from pathlib import Path
-from typing import Any
+from typing import Any, get_args
 
 from crescentlab.causality import Plan, plan
+from crescentlab.component import field_quantity
 from crescentlab.elaborate import Design, elaborate
 from crescentlab.errors import InputError, SimulationError, nearest
+from crescentlab.fluid import Fluid
 from crescentlab.graph import build
 from crescentlab.library import Library, installed
-from crescentlab.netlist import Netlist
+from crescentlab.netlist import Netlist, SimulationSection
 from crescentlab.result import Result
 from crescentlab.solvers.loop import Options, integrate
 from crescentlab.system import System, assemble
 from crescentlab.trace import structure_of
 from crescentlab.units import QUANTITIES, UnitError
+
+SOLVERS: tuple[str, ...] = get_args(SimulationSection.model_fields["solver"].annotation)
+"""Names of ``--solver`` and ``solver:``."""
+MAX_ROWS = 10_000_000
+"""Most rows of a uniform output grid."""
 
 
 def shipped() -> dict[str, Path]:
@@ -71,8 +79,11 @@ class Circuit:
         return elaborate(self.netlist, self.library, parameters, no_code=self.no_code)
 
     def plan(self, parameters: Mapping[str, str] | None = None, *, allow_open: bool = False) -> Plan:
-        """Its causality; raises an explained conflict."""
-        return plan(build(self.design(parameters)), self.library, allow_open=allow_open)
+        """Its causality; raises an explained conflict. With ``allow_open`` a part's ports may be left open."""
+        design = self.design(parameters)
+        if allow_open and not design.fluids:
+            design = replace(design, fluids=stand_in_fluids(design, self.library))
+        return plan(build(design), self.library, allow_open=allow_open)
 
     def system(self, parameters: Mapping[str, str] | None = None) -> System:
         """The assembled ODE."""
@@ -104,8 +115,7 @@ class Circuit:
             stop=_time(stop, "stop", section.stop), rtol=section.rtol if rtol is None else rtol, solver=solver or section.solver,
             max_step=_time(max_step, "max_step", section.max_step), output_step=_time(output_step, "output_step", section.output_step),
         )  # fmt: skip
-        if not 0 < options.rtol < 1:
-            raise InputError(f"rtol {options.rtol:g}: the relative tolerance lies between 0 and 1; write for example 1e-6")
+        _check(options)
         values = system.values(design)
         trajectory = integrate(system, values, options, progress)
         result = Result(system, values, design, trajectory)
@@ -116,6 +126,32 @@ class Circuit:
         if check and trajectory.status == "interrupted":
             raise KeyboardInterrupt(trajectory.error)
         return result
+
+
+def stand_in_fluids(design: Design, library: Library) -> dict[str, Fluid]:
+    """A fluid for a part alone: its causality does not depend on the fluid's numbers, only on there being one.
+
+    The first fluid of the library whose required fields accept their quantity's usual size.
+    """
+    names = {net.fluid for net in design.nets if net.fluid} or {"fluid"}
+    for cls in library.fluids.values():
+        needed = {f.alias or n: field_quantity(f) for n, f in cls.model_fields.items() if f.is_required()}
+        try:
+            made = cls.model_validate({n: q.nominal for n, q in needed.items() if q is not None})
+        except ValueError:
+            continue
+        return dict.fromkeys(sorted(names), made)
+    return {}
+
+
+def _check(options: Options) -> None:
+    """Refuse what argparse or a caller cannot know to be wrong."""
+    if not 0 < options.rtol < 1:
+        raise InputError(f"rtol {options.rtol:g}: the relative tolerance lies between 0 and 1; write for example 1e-6")
+    if options.solver not in SOLVERS:
+        raise InputError(f"solver {options.solver!r}: {nearest(options.solver, SOLVERS)}")
+    if options.output_step is not None and options.stop / options.output_step > MAX_ROWS:
+        raise InputError(f"output_step {options.output_step:g} s makes more than {MAX_ROWS} rows until {options.stop:g} s; write a longer one")
 
 
 def _text(value: str | float) -> str:

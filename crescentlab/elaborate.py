@@ -396,13 +396,14 @@ def _instance(
     data: dict[str, Any] = {}
     given = {name: child for name, child in node.value.items() if name not in skip}
     from_command: set[str] = set()
-    for name in cls.model_fields:
+    fields = {info.alias or name: info for name, info in cls.model_fields.items()}
+    for name in fields:
         text = overrides.take(f"{full}.{name}")
         if text is not None:
             given[name] = Node(text, COMMAND)
             from_command.add(name)
     for name, child in given.items():
-        info = cls.model_fields.get(name)
+        info = fields.get(name)
         where = f"--set {full}.{name}" if name in from_command else f"{subject}.{name}"
         data[name] = _plain(child, info, lookup, where) if info is not None else child.plain()
     try:

@@ -227,11 +227,11 @@ def _fields_at(model: type[BaseModel], path: list[Any]) -> list[str]:
         return list(PlotSection.model_fields)
     if path and path[0] == "nets":
         return list(NetSection.model_fields)
-    return list(model.model_fields)
+    return [info.alias or name for name, info in model.model_fields.items()]
 
 
 def _example(model: type[BaseModel], key: str) -> str:
-    field = model.model_fields.get(key)
+    field = next((info for name, info in model.model_fields.items() if key in (name, info.alias)), None)
     quantity = field_quantity(field) if field is not None else None
     if quantity is not None:
         return f"; write for example {key}: {quantity.example()}"

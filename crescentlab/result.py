@@ -9,6 +9,7 @@ from __future__ import annotations
 import csv
 import functools
 import math
+import os
 import re
 from collections.abc import Iterable, Sequence
 from pathlib import Path
@@ -82,7 +83,9 @@ class Result:
         """Mean over time between ``start`` and ``stop`` [s], trapezoidal between rows."""
         inside = (self.time >= start) & (self.time <= stop)
         t, y = self.time[inside], self[name][inside]
-        return float(np.trapezoid(y, t) / (t[-1] - t[0]))
+        if not t.size:
+            raise InputError(f"{name}: the run has no rows between {start:g} s and {stop:g} s")
+        return float(np.trapezoid(y, t) / (t[-1] - t[0])) if t[-1] > t[0] else float(y[-1])
 
     @functools.cached_property
     def balance(self) -> Balance | None:
@@ -103,21 +106,21 @@ class Result:
 
     def chosen(self, record: Sequence[str] = ()) -> list[str]:
         """Column names that match the globs, all of them without globs."""
-        every: list[str] = []
-        for name in self.names:
-            variable = self.system.variables[name]
-            every += [f"{name}[{k + 1}]" for k in range(len(variable.expression()))] if variable.vector else [name]
-        if not record:
-            return every
-        chosen: list[str] = []
-        for glob in record:
-            pattern = re.compile("".join(".*" if c == "*" else "." if c == "?" else re.escape(c) for c in glob) + r"\Z")
-            whole = re.compile(pattern.pattern[:-2] + r"(\[\d+\])?\Z")
-            hits = [n for n in every if pattern.match(n)] or [n for n in every if whole.match(n)]
-            if not hits:
-                raise InputError(f"--record {glob}: no variable matches: {nearest(glob, every)}")
-            chosen += [n for n in hits if n not in chosen]
-        return chosen
+        every = column_names(self.system)
+        return matching(record, every, "--record") if record else every
+
+    def elements(self, name: str) -> list[str]:
+        """A variable's columns: itself, or for a vector each of its elements."""
+        base, element = _split(name)
+        variable = self.system.find(base)
+        if element is not None or not variable.vector:
+            return [name]
+        return [f"{name}[{k + 1}]" for k in range(len(variable.expression()))]
+
+    def net_pressures(self) -> list[str]:
+        """Pressures of the circuit's own hydraulic nets, those inside subcircuits left out."""
+        nets = [net.name for net in self.design.nets if "." not in net.name and net.ports[0].port.domain.name == "hydraulic"]
+        return [f"{name}.p" for name in nets if f"{name}.p" in self.system.variables]
 
     def attributes(self) -> dict[str, Any]:
         """What a file says of its run."""
@@ -163,26 +166,62 @@ def _split(name: str) -> tuple[str, int | None]:
     return (match[1], int(match[2])) if match else (name, None)
 
 
+def column_names(system: System) -> list[str]:
+    """Names of a result's columns, vectors element by element."""
+    names: list[str] = []
+    for name, variable in system.variables.items():
+        if variable.listed:
+            names += [f"{name}[{k + 1}]" for k in range(len(variable.expression()))] if variable.vector else [name]
+    return names
+
+
+def check_record(system: System, record: Sequence[str]) -> None:
+    """Refuse globs that match nothing, before the run."""
+    if record:
+        matching(record, column_names(system), "--record")
+
+
+def matching(globs: Sequence[str], names: Sequence[str], subject: str) -> list[str]:
+    """The names that match the globs, in the globs' order; only ``*`` and ``?`` are wild, a vector's name is all its elements."""
+    chosen: dict[str, None] = {}
+    for glob in globs:
+        wild = "".join(".*" if c == "*" else "." if c == "?" else re.escape(c) for c in glob)
+        exact, whole = re.compile(rf"{wild}\Z"), re.compile(rf"{wild}(\[\d+\])?\Z")
+        hits = [n for n in names if exact.match(n)] or [n for n in names if whole.match(n)]
+        if not hits:
+            raise InputError(f"{subject} {glob}: no variable matches: {nearest(glob, names)}")
+        chosen.update(dict.fromkeys(hits))
+    return list(chosen)
+
+
 def check_target(path: Path) -> None:
     """Refuse an output file that cannot be written, before the run."""
     if path.suffix not in SUFFIXES:
         raise InputError(f"-o {path}: the suffix {path.suffix!r} is none of {', '.join(SUFFIXES)}; write for example -o {path.stem or 'result'}.nc")
     if not path.parent.is_dir():
         raise InputError(f"-o {path}: the folder {path.parent} does not exist; make it first")
+    if path.is_dir() or not os.access(path if path.exists() else path.parent, os.W_OK):
+        raise InputError(f"-o {path}: it cannot be written; choose another place")
 
 
 def write_series(path: Path, time: np.ndarray, columns: dict[str, np.ndarray], units: dict[str, str], attributes: dict[str, Any]) -> None:
-    """Write series to a file; the suffix chooses the format."""
-    if path.suffix == ".csv":
-        with path.open("w", newline="", encoding="utf-8") as file:
-            writer = csv.writer(file)
-            writer.writerow(["time [s]", *[f"{n} [{units[n]}]" for n in columns]])
-            for row in zip(time.tolist(), *[v.tolist() for v in columns.values()], strict=True):
-                writer.writerow([repr(v) for v in row])
-    elif path.suffix == ".parquet":
-        _write_parquet(path, time, columns, units, attributes)
-    else:
-        _write_netcdf(path, time, columns, units, attributes)
+    """Write series to a file; the suffix chooses the format. An old file is replaced when the new one is complete."""
+    part = path.with_name(f".{path.stem}-{os.getpid()}{path.suffix}")
+    try:
+        _WRITERS[path.suffix](part, time, columns, units, attributes)
+        os.replace(part, path)
+    except OSError as error:
+        raise InputError(f"{path}: cannot be written ({error.strerror or error})") from None
+    finally:
+        part.unlink(missing_ok=True)
+
+
+def _write_csv(path: Path, time: np.ndarray, columns: dict[str, np.ndarray], units: dict[str, str], attributes: dict[str, Any]) -> None:
+    with path.open("w", newline="", encoding="utf-8") as file:
+        writer = csv.writer(file)
+        writer.writerow(["time [s]", *[f"{n} [{units[n]}]" for n in columns]])
+        for row in zip(time.tolist(), *[v.tolist() for v in columns.values()], strict=True):
+            writer.writerow([repr(v) for v in row])
 
 
 def _write_parquet(path: Path, time: np.ndarray, columns: dict[str, np.ndarray], units: dict[str, str], attributes: dict[str, Any]) -> None:
@@ -206,6 +245,9 @@ def _write_netcdf(path: Path, time: np.ndarray, columns: dict[str, np.ndarray], 
             variable.attrs["units"] = unit
         for key, value in attributes.items():
             file.attrs[key] = value
+
+
+_WRITERS = {".csv": _write_csv, ".parquet": _write_parquet, ".nc": _write_netcdf}
 
 
 def read_series(path: Path) -> tuple[np.ndarray, dict[str, np.ndarray], dict[str, str], dict[str, Any]]:

@@ -26,7 +26,9 @@ LAYERS: tuple[tuple[str, ...], ...] = (
     ("causality",),
     ("system",),
     ("solvers",),
-    ("result", "balance", "simulate", "schematic"),
+    ("balance",),
+    ("result", "plotting", "schematic"),
+    ("circuit",),
     ("__init__",),
     ("cli",),
 )
@@ -36,7 +38,7 @@ A room is a module or a package directly under `crescentlab/`; `__init__` is the
 """
 
 NEVER = {"result": {"system", "trace", "solvers"}}
-"""Imports refused although the layers would allow them: a result is given its evaluator."""
+"""Imports refused although the layers would allow them, types aside: a result is given its evaluator."""
 
 FOR_COMPONENTS = {"component", "domain", "errors", "fluid", "maths", "tables", "units"}
 """Modules of the kernel that component files may import from."""
@@ -66,24 +68,29 @@ def kernel() -> dict[str, Path]:
 
 
 @cache
-def imported(path: Path) -> tuple[tuple[str, str | None], ...]:
-    """Each (module, name) that a file imports anywhere in it, functions and type checking included."""
-    package = ".".join(path.relative_to(ROOT).parent.parts)
+def imported(path: Path, types: bool = True) -> tuple[tuple[str, str | None], ...]:
+    """Each (module, name) that a file imports anywhere in it, with or without those for type checking alone."""
+    package = path.relative_to(ROOT).parent.parts
+    tree = ast.parse(path.read_text(encoding="utf-8"), str(path))
+    guards = [node for node in ast.walk(tree) if isinstance(node, ast.If) and ast.unparse(node.test) == "TYPE_CHECKING"]
+    skipped = set() if types else {id(inner) for guard in guards for inner in ast.walk(guard)}
     found: list[tuple[str, str | None]] = []
-    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"), str(path))):
+    for node in ast.walk(tree):
+        if id(node) in skipped:
+            continue
         if isinstance(node, ast.Import):
             found += [(alias.name, None) for alias in node.names]
         elif isinstance(node, ast.ImportFrom):
-            base = package.split(".")[: len(package.split(".")) - node.level + 1] if node.level else []
+            base = package[: len(package) - node.level + 1] if node.level else ()
             module = ".".join([*base, *([node.module] if node.module else [])])
             found += [(module, alias.name) for alias in node.names]
     return tuple(found)
 
 
-def kernel_imports(path: Path) -> Iterator[str]:
+def kernel_imports(path: Path, types: bool = True) -> Iterator[str]:
     """Names of the kernel's modules that a file imports; ``__init__`` for a name of the public door."""
-    for module, name in imported(path):
-        if module.partition(".")[0] != "crescentlab":
+    for module, name in imported(path, types):
+        if module.partition(".")[0] != "crescentlab" or (module, name) == ("crescentlab", "__version__"):
             continue
         inner = module.removeprefix("crescentlab").lstrip(".")
         full = ".".join(part for part in (inner, name) if part)
@@ -104,11 +111,12 @@ def test_a_module_imports_only_from_its_layer_and_below(module: str) -> None:
     own = layer_of(module)
     for other in kernel_imports(kernel()[module]):
         assert layer_of(other) <= own, f"crescentlab.{module} imports {other}, which lies above it"
+    for other in kernel_imports(kernel()[module], types=False):
         assert other.partition(".")[0] not in NEVER.get(module.partition(".")[0], set()), f"{module} imports {other}"
 
 
 def test_no_module_imports_itself_in_a_circle() -> None:
-    imports = {module: set(kernel_imports(path)) - {module} for module, path in kernel().items()}
+    imports = {module: set(kernel_imports(path, types=False)) - {module} for module, path in kernel().items()}
     assert tuple(graphlib.TopologicalSorter(imports).static_order())  # CycleError shows the circle
 
 

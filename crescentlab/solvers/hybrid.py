@@ -185,7 +185,8 @@ class Hybrid:
     def scan(self, t: float, x: np.ndarray) -> list[tuple[float, int]]:
         """All roots ahead of relations that curve in time, found on a fine grid and then closed in on."""
         times = np.linspace(t, self.end, SCAN_POINTS)
-        columns = self.system.relation(times.reshape(1, -1), x, self.h, self.b, self.p)
+        prepared = self.system.relation
+        columns = prepared.function(times.reshape(1, -1), x, self.h, self.b, prepared.parameters(self.p))
         g, rate = np.array(columns[0])[self.curved], np.array(columns[1])[self.curved]
         found: list[tuple[float, int]] = []
         for row, k in enumerate(self.curved):

@@ -6,7 +6,9 @@ import time
 from collections.abc import Callable
 from dataclasses import dataclass
 
+import casadi as ca
 import numpy as np
+from scipy import sparse
 
 from crescentlab import units
 from crescentlab.domain import HYDRAULIC
@@ -15,7 +17,7 @@ from crescentlab.solvers.hybrid import Hybrid
 from crescentlab.solvers.roots import RootFinder
 from crescentlab.solvers.scipy import Functions, Stepper, stepper
 from crescentlab.solvers.trajectory import GAUSS_NODES, Happening, Pieces, Recording, Statistics, Trajectory
-from crescentlab.system import Evaluator, System, Values
+from crescentlab.system import System, Values
 
 ANGLE_STEP = 0.3
 """A step turns no angle further than this [rad], so that what depends on it is not stepped over."""
@@ -74,8 +76,6 @@ class _Run:
         clock = self.system.clock
         if not clock.numel():
             return np.inf
-        import casadi as ca
-
         rates = ca.Function("clock", self.system.arguments, [ca.jacobian(clock, self.system.t)])
         times = np.linspace(self.options.start, self.options.stop, CLOCK_POINTS)
         v = self.values
@@ -196,7 +196,7 @@ class _Run:
                     return self.inside(event, high, x_high)
                 self.record(high, x_high)
                 return high, x_high
-        if not kept and not self.hybrid.finished:
+        if not kept and not self.hybrid.finished and t < self.options.stop:
             self.statistics.restarts += 1
             self.started(t, x_after)
         return t, x_after
@@ -309,7 +309,8 @@ class _Run:
     def blame(self, t: float, x: np.ndarray) -> str:
         """The state whose rate changes fastest against its tolerance."""
         f = self.functions.rhs(t, x)
-        matrix = self.system.jacobian(t, x, self.functions.h, self.functions.b, self.values.p).sparse()
+        pattern = self.functions.pattern
+        matrix = sparse.csc_matrix((self.functions.nonzeros(t, x), pattern.indices, pattern.indptr), shape=pattern.shape)
         change = np.abs(matrix @ f) / (self.atol + self.options.rtol * np.abs(x))
         name = self.system.state_names[int(np.nanargmax(change))] if change.size and np.isfinite(change).any() else "unknown"
         return f"{name} limits it; try --solver bdf, a larger volume or mass there, or smoother signals"
@@ -360,4 +361,4 @@ class _PressureLimits:
         return None
 
 
-__all__ = ["Evaluator", "Options", "integrate"]
+__all__ = ["Options", "integrate"]

@@ -49,7 +49,7 @@ class Functions:
     @property
     def pattern(self) -> sparse.csc_matrix:
         """Sparsity of the Jacobian."""
-        pattern = self.system.jacobian.sparsity_out(0)
+        pattern = self.system.jacobian_expression.sparsity()
         rows, start = np.array(pattern.row()), np.array(pattern.colind())
         return sparse.csc_matrix((np.ones(rows.size), rows, start), shape=(self.n, self.n))
 

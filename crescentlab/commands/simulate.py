@@ -1,0 +1,155 @@
+"""``crescentlab simulate``: integrate a circuit, write its result, print a summary."""
+
+from __future__ import annotations
+
+import argparse
+import json
+import logging
+import math
+import sys
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+from crescentlab import plotting
+from crescentlab.circuit import Circuit, load
+from crescentlab.cli import DONE, FAILED, INTERRUPTED
+from crescentlab.commands.text import counted, settings, table
+from crescentlab.result import Result, check_record, check_target
+from crescentlab.units import QUANTITIES
+
+log = logging.getLogger("crescentlab")
+
+EXIT_CODES = {"done": DONE, "stopped": DONE, "failed": FAILED, "interrupted": INTERRUPTED}
+MAX_NETS = 12
+"""Most net pressures listed in the summary."""
+
+
+def run(options: argparse.Namespace) -> int:
+    """Run the command."""
+    values = settings(options.set)
+    circuit = load(options.circuit, no_code=options.no_code)
+    target = _target(options.output, circuit)
+    _check_before(circuit, values, options)
+    with _progress(options.quiet) as progress:
+        result = circuit.simulate(
+            options.stop, values, solver=options.solver, rtol=options.rtol, output_step=options.output_step,
+            progress=progress, check=False,
+        )  # fmt: skip
+    status = result.trajectory.status
+    log.info("integrated in %.3f s: %s", result.trajectory.statistics.wall_s, status)
+    if target is not None:
+        result.write(target, options.record)
+        log.info("wrote %s", target)
+    pictures = plotting.write_plots(result, (target or Path(circuit.netlist.name)).with_suffix("")) if options.plot else []
+    if options.json:
+        print(json.dumps(_finite(report(result, target)), indent=2))
+    elif not options.quiet:
+        print(summary(result, target, options.record, pictures))
+    if EXIT_CODES[status] != DONE:
+        print(result.trajectory.error, file=sys.stderr)
+    return EXIT_CODES[status]
+
+
+def _target(output: str | None, circuit: Circuit) -> Path | None:
+    """The file to write, checked before the run; None for ``-o none``."""
+    if output == "none":
+        return None
+    target = Path(output or f"{circuit.netlist.name}.nc")
+    check_target(target)
+    return target
+
+
+def _check_before(circuit: Circuit, values: dict[str, str], options: argparse.Namespace) -> None:
+    """Find before the run what would fail after it: globs and plots that name nothing."""
+    system = circuit.system(values)
+    log.info("assembled in %.3f s: %s", circuit.assembly_s, counted(len(system.state_names), "state"))
+    check_record(system, options.record)
+    if options.plot:
+        plotting.check_plots(circuit.netlist, system)
+
+
+@contextmanager
+def _progress(quiet: bool) -> Iterator[Callable[[float], None] | None]:
+    """A bar on stderr if that is a terminal, otherwise nothing."""
+    if quiet or not sys.stderr.isatty():
+        yield None
+        return
+    from tqdm import tqdm
+
+    with tqdm(total=1.0, bar_format="{percentage:3.0f} %|{bar}| {elapsed} < {remaining}", leave=False, file=sys.stderr) as bar:
+
+        def show(share: float) -> None:
+            bar.n = min(share, 1.0)
+            bar.refresh()
+
+        yield show
+
+
+# -- what is printed -----------------------------------------------------------------------------
+
+
+def report(result: Result, target: Path | None) -> dict[str, Any]:
+    """The object of ``--json``."""
+    t, balance = result.trajectory, result.balance
+    s = t.statistics
+    return {
+        "status": t.status, "final_time": t.steps.t[-1], "wall_s": s.wall_s, "steps": s.steps, "evaluations": s.evaluations,
+        "jacobians": s.jacobians, "events": s.events, "ticks": s.ticks, "restarts": s.restarts,
+        "states": len(result.system.state_names), "balance": balance.as_json() if balance else None,
+        "warnings": list(t.warnings), "file": str(target) if target else None, "error": t.error or None,
+    }  # fmt: skip
+
+
+def _finite(value: Any) -> Any:
+    """JSON knows no NaN: such numbers become null."""
+    if isinstance(value, dict):
+        return {key: _finite(each) for key, each in value.items()}
+    return None if isinstance(value, float) and not math.isfinite(value) else value
+
+
+def summary(result: Result, target: Path | None, record: list[str], pictures: list[Path]) -> str:
+    """The run in a few lines, quantities in display units."""
+    t, s = result.trajectory, result.trajectory.statistics
+    time = QUANTITIES["time"]
+    end = time.show(t.steps.t[-1], result.display_unit(time))
+    work = [counted(s.steps, "step"), counted(s.evaluations, "evaluation"), counted(s.jacobians, "Jacobian"), counted(s.restarts, "restart")]
+    rows = [
+        ("end", end if t.status == "done" else f"{end}, {t.status}"),
+        ("solver", f"{t.solver}: {', '.join(work)} in {s.wall_s:.3g} s"),
+        ("model", f"{counted(len(result.system.state_names), 'state')}; {counted(s.events, 'event')}, {counted(s.ticks, 'tick')}"),
+    ]
+    if result.balance is not None:
+        worst = max(result.balance.components.items(), key=lambda item: item[1])
+        rows.append(("balance", f"{result.balance.circuit:.1e} of the flow; at most {worst[1]:.1e}, {worst[0]}"))
+        merged = sum(result.balance.merged.values())
+        if merged:
+            rows.append(("merged", f"{QUANTITIES['volume'].show(merged, 'cm3', 3)} moved by events"))
+    parts = [result.title, table(rows, indent="  ")]
+    if figures := _figures(result):
+        parts.append(table(figures, right=(2, 3, 4, 5), indent="  "))
+    parts += [f"  warning: {warning}" for warning in t.warnings]
+    written = [f"  wrote {path}" for path in pictures]
+    if target is not None:
+        names = counted(len(result.chosen(record)), "variable")
+        written.insert(0, f"  wrote {target}: {counted(result.time.size, 'row')}, {names}")
+    return "\n\n".join([*parts, "\n".join(written)] if written else parts)
+
+
+def _figures(result: Result) -> list[tuple[str, ...]]:
+    """Outputs and net pressures: unit, last value, mean, least, largest."""
+    names = [o.name for o in result.design.outputs if o.scope == ""] + result.net_pressures()[:MAX_NETS]
+    columns = [n for name in names for n in result.elements(name)]
+    result.load(names)
+    rows = [("", "", "end", "mean", "min", "max")] if columns else []
+    for name in columns:
+        quantity, series = result.quantity(name), result[name]
+        unit = result.display_unit(quantity)
+        numbers = (series[-1], result.mean(name), series.min(), series.max())
+        rows.append((name, "" if unit == "1" else unit, *[_scaled(quantity.show(float(v), unit)) for v in numbers]))
+    return rows
+
+
+def _scaled(shown: str) -> str:
+    return shown.partition(" ")[0]
