@@ -156,9 +156,9 @@ class Result:
         return plot_series(self, list(names), path=Path(path) if path else None, title=title)
 
     def display_unit(self, quantity: Quantity) -> str:
-        """The unit that the circuit's ``display:`` (or the default) shows a quantity in."""
+        """The unit that the circuit's ``display:`` shows a quantity in; by default the one engineers use."""
         chosen = {**DISPLAY, **self.design.netlist.sections.display}
-        return chosen.get(quantity.name, quantity.si)
+        return chosen.get(quantity.name) or next(iter(quantity.units)) or quantity.si
 
 
 def _split(name: str) -> tuple[str, int | None]:

@@ -30,7 +30,7 @@ LAYERS: tuple[tuple[str, ...], ...] = (
     ("result", "plotting", "schematic"),
     ("circuit",),
     ("__init__",),
-    ("cli",),
+    ("cli", "commands"),
 )
 """Rooms of the kernel, lowest first. A module imports from its own layer and those above it in this list.
 
