@@ -9,7 +9,7 @@ from pydantic import Field
 from crescentlab.component import Component, Equations, structural
 from crescentlab.domain import gives_pressure, held, observable, state, stores, takes_pressure, undecided_pressure
 from crescentlab.fluid import Fluid
-from crescentlab.maths import Expr, every, fabs, maximum, pi, stack, total
+from crescentlab.maths import Expr, every, fabs, fail_when, maximum, pi, stack, total
 from crescentlab.units import Flow, Length, Pressure, Ratio, Time, Volume
 
 from .flow_laws import pipe_friction_drop
@@ -44,18 +44,18 @@ class LaxWendroffLine(Component):
               \frac{\rho_0}{A}\frac{\partial q}{\partial t} + \frac{\partial p}{\partial x}
               = -\frac{f}{d}\frac{\rho v|v|}{2}, \qquad r = \rho(p)/\rho_0, \; v = q/(A r)
 
-    p [Pa] gauge; q [m^3/s] mass flow over \rho_0, positive from a to b; A = \pi d^2/4 [m^2]; d [m]; x [m];
-    v [m/s]; \rho [kg/m^3], \rho_0 at 0 bar gauge; f [-] Darcy factor of steady flow (Churchill), each taken
-    from the fluid at every node and half node. The nodes are \Delta x [m] apart and step every
-    \Delta t = 0.9 \Delta x / a(p_{max}) [s]. Between two ticks an end sees the wave that arrives there,
-    p - Z q = const. along dx/dt = -a, Z = \rho_0 a/A [Pa s/m^3], from a foot interpolated among the nodes, so
-    that pressure and flow at the ends are continuous at the ticks; the entry loss
-    \Delta p = K \rho_0 q|q|/(2A^2) sits at end a. The fluid in the line, half cells at its ends, is
-    kept exactly: what a half cell and the flow through its end disagree by goes to the two nodes beside it.
-    Valid while (a + |v|) \Delta t/\Delta x, the observable `courant`, stays below 1. Not for friction that
-    depends on frequency, for flow near the speed of sound, or for lines shorter than some ten diameters.
-    Source: R. D. Richtmyer, NCAR Technical Note 63-2 (1962); ends by the method of characteristics,
-    Wylie & Streeter, Fluid Transients in Systems (1993), chapter 3; Rundo & Corvaglia (2016), section 5.
+    p [Pa] gauge; q [m^3/s] mass flow over \rho_0, positive from a to b; A = \pi d^2/4 [m^2]; d [m]; x [m]; t [s];
+    v [m/s]; \rho [kg/m^3], \rho_0 at 0 bar gauge; f [-] Darcy factor of steady flow (Churchill). All are taken from
+    the fluid at every node and half node. The nodes, \Delta x [m] apart, step every
+    \Delta t = \nu \Delta x/a(p_{max}) [s], \nu = `courant_number` [-], a [m/s] the wave speed. Between two ticks an
+    end sees the wave that arrives there, p - Z q along dx/dt = -a (at b mirrored), Z = \rho_0 a/A [Pa s/m^3], from
+    the foot of its characteristic; what the end then has becomes its node's value at the tick, so that neither jumps.
+    The entry loss K \rho_0 q|q|/(2 A^2) [Pa] sits at end a. The fluid in the nodes, half cells at the ends, changes by
+    what the ends take in, exactly. Valid while (a + |v|) \Delta t/\Delta x, the observable `courant`, is below 1.
+    Not for friction that depends on frequency, for flow near the speed of sound (the convective term, v/a, is left
+    out), or for lines of less than some ten diameters.
+    Source: R. D. Richtmyer, NCAR Technical Note 63-2 (1962); Wylie & Streeter, Fluid Transients in Systems (1993),
+    chapter 3; used for the test rig's pipe in Rundo & Corvaglia (2016), section 6.1.
     """
 
     family: ClassVar[bool] = True
@@ -162,11 +162,17 @@ class LaxWendroffLine(Component):
         p_inner, q_inner = full_step(p_node, q_node, between, dt, dx, area, fluid)
 
         r = fluid.density(p_node) / fluid.rho_0
+        courant = reduce(maximum, wave_speed(p_node, fluid) + fabs(q_node) / (area * r)) * dt / dx
         return {
             "der_into_a": q_a,
             "der_into_b": q_b,
             "q": q_a,
-            "courant": reduce(maximum, wave_speed(p_node, fluid) + fabs(q_node) / (area * r)) * dt / dx,
+            "courant": courant,
+            "too_fast": fail_when(
+                courant > 1,
+                "its Courant number exceeds 1, so the waves outrun the time step; "
+                "write a max_pressure above the highest pressure that comes, at least {p_highest}",
+            ),
             "p_highest": reduce(maximum, p_node),
             "content": area * dx * (total(r) - (r[0] + r[-1]) / 2) + taken_a + taken_b,
             "tick": every(

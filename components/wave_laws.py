@@ -147,8 +147,8 @@ def closing_flux(
 
     r, q before and r', q' after the step at the end node; V = `taken` [m^3] through the end during it, exactly;
     \bar p [Pa] mean pressure at the end, that of the mean flow with the `wave` arriving halfway; g [Pa/m];
-    flows positive away from the end. Mass is thus kept to rounding; taking both fluxes from the same books leaves a jump at
-    the end sharp and the scheme stable for \nu <= 1 between ends of any pressure or flow.
+    flows positive away from the end. Mass is thus kept to rounding. Closing both books, of mass and of momentum,
+    leaves a jump at the end sharp and the scheme stable for \nu <= 1 between ends of given pressure or flow.
     """
     r, r_new = fluid.density(p) / fluid.rho_0, fluid.density(p_new) / fluid.rho_0
     p_mean = end_pressure(taken / dt, wave, 0.0, area, fluid)

@@ -45,7 +45,7 @@ def balance(system: System, values: Values, trajectory: Trajectory) -> Balance |
     into = np.zeros((len(contents), low.size))
     size = np.zeros_like(into)
     h, b = np.array(pieces.h).T, np.array(pieces.b).T
-    x = np.array(pieces.x)
+    x = pieces.at_nodes()
     for node, weight in enumerate(GAUSS_WEIGHTS):
         # relations that compare time read it from frozen bits, so the node's own time serves signals
         t = low + (high - low) * GAUSS_NODES[node]

@@ -72,10 +72,7 @@ def every(dt: Any, **then: Any) -> Tick:
 
 
 def fail_when(condition: Any, message: str) -> Failure:
-    """End the run when ``condition`` becomes true; ``{name}`` in the message shows a value.
-
-    The names are observables and parameters of the component.
-    """
+    """End the run when ``condition`` becomes true; ``{name}`` in the message shows that observable with its unit."""
     return Failure(condition, message)
 
 

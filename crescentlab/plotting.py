@@ -94,7 +94,7 @@ def _figure(result: Result, plot: PlotSection) -> Figure:
             unit = result.display_unit(quantity)
             for (colour, line), (name, series) in zip(_styles(), columns.items(), strict=False):
                 axes.plot(x[inside], _in_unit(series[inside], quantity, unit), color=colour, linestyle=line, label=name)
-            axes.set_ylabel(_label(quantity.title, unit) if len(columns) > 1 else _label(next(iter(columns)), unit))
+            axes.set_ylabel(_label(quantity, unit, list(columns)))
             axes.margins(x=0.0 if plot.x is None else 0.02)
             if len(columns) > 1:
                 _legend(axes, len(columns))
@@ -127,15 +127,17 @@ def _horizontal(result: Result, name: str | None) -> tuple[np.ndarray, str]:
     if name is not None and len(result.elements(name)) != 1:
         raise InputError(f"plots: x: {name} is a vector; write one element, for example {name}[1]")
     series = result.time if name is None else result[result.elements(name)[0]]
-    return _in_unit(series, quantity, unit), _label("time" if name is None else name, unit)
+    return _in_unit(series, quantity, unit), _label(quantity, unit, [name or ""])
 
 
 def _in_unit(series: np.ndarray, quantity: Quantity, unit: str) -> Any:
     return (series - quantity.offsets.get(normalise(unit), 0.0)) / quantity.factor(unit)
 
 
-def _label(name: str, unit: str) -> str:
-    """An axis label; units read with their powers raised."""
+def _label(quantity: Quantity, unit: str, names: Sequence[str]) -> str:
+    """An axis label: the one variable shown, its quantity, and the unit with its powers raised."""
+    known = quantity.title if quantity.name in QUANTITIES and quantity.name != "ratio" else ""
+    name = ", ".join(text for text in (names[0] if len(names) == 1 else "", known) if text)
     raised = re.sub(r"\^?(?<=[A-Za-z)^])(\d)", lambda m: "⁰¹²³⁴⁵⁶⁷⁸⁹"[int(m[1])], unit)
     return name if unit in ("1", "") else f"{name} [{raised}]"
 

@@ -107,16 +107,32 @@ class Evaluator:
         self.inputs = [np.zeros(max(n, 1)) for n in self.sizes]
         self.outputs = [np.zeros(max(function.nnz_out(k), 1)) for k in range(function.n_out())]
         self.results = [out[: function.nnz_out(k)] for k, out in enumerate(self.outputs)]
+        self.x = self.inputs[1][: self.sizes[1]]
+        self.last_h: Array | None = None
+        self.last_b: Array | None = None
         self.inputs[-1][: self.sizes[-1]] = np.array(prepared.parameters(p)).ravel()
         for k, array in enumerate(self.inputs):
             self.buffer.set_arg(k, memoryview(array))
         for k, array in enumerate(self.outputs):
             self.buffer.set_res(k, memoryview(array))
 
-    def __call__(self, *arguments: Any) -> list[Array]:
-        """Evaluate; the returned arrays are overwritten by the next call."""
-        for array, n, value in zip(self.inputs, self.sizes, arguments, strict=False):
-            array[:n] = value
+    def __call__(self, t: float, x: Array, h: Array, b: Array, extra: Array | None = None) -> list[Array]:
+        """Evaluate; the returned arrays are overwritten by the next call.
+
+        Held values and bits are copied only when they are other arrays than last time: they are replaced
+        at stops, never changed in place.
+        """
+        inputs = self.inputs
+        inputs[0][0] = t
+        self.x[:] = x
+        if h is not self.last_h:
+            inputs[2][: self.sizes[2]] = h
+            self.last_h = h
+        if b is not self.last_b:
+            inputs[3][: self.sizes[3]] = b
+            self.last_b = b
+        if extra is not None:
+            inputs[4][: self.sizes[4]] = extra
         self.trigger()
         return self.results
 
@@ -171,10 +187,10 @@ class System:
 
     @functools.cached_property
     def relation(self) -> Prepared:
-        """Relations g, their time derivatives along f, and the magnitude of their sides."""
-        g = self.relations
-        rate = ca.jtimes(g, self.x, self.f) + ca.jacobian(g, self.t) if g.numel() else ca.SX(0, 1)
-        return prepare("g", self.arguments[:-1], self.p, [g, rate, self.scales])
+        """(t, x, h, b, dx/dt) -> relations g, their time derivatives, and the magnitude of their sides."""
+        g, rate_x = self.relations, ca.SX.sym("v", self.x.numel())
+        rate = ca.jtimes(g, self.x, rate_x) + ca.jacobian(g, self.t) if g.numel() else ca.SX(0, 1)
+        return prepare("g", [*self.arguments[:-1], rate_x], self.p, [g, rate, self.scales])
 
     @functools.cached_property
     def condition(self) -> Prepared:

@@ -296,7 +296,7 @@ class _Tracing:
         periods: list[ca.SX] = []
         for (name, value), condition in zip(returned.items(), self.conditions, strict=True):
             if isinstance(value, Failure):
-                names = tuple(n for n in (*self.observables.offsets, *self.parameters) if f"{{{n}" in value.message)
+                names = tuple(n for n in self.observables.offsets if f"{{{n}}}" in value.message)
                 infos.append(EventInfo(name, "fail", condition=len(conditions), message=value.message, message_names=names))
                 conditions.append(condition)
             elif isinstance(value, Event):

@@ -7,7 +7,6 @@ from typing import Any
 import casadi as ca
 import numpy as np
 import pytest
-
 from crescentlab.components.fluids import AeratedOil, SimpleOil
 from crescentlab.components.lax_wendroff import (
     LaxWendroffLine,
@@ -17,6 +16,7 @@ from crescentlab.components.lax_wendroff import (
     LaxWendroffLineTakesTakes,
 )
 from crescentlab.components.wave_laws import arriving_wave, full_step, half_step, pressure_of_density
+
 from crescentlab.domain import Held
 from crescentlab.symbols import Sym
 
@@ -170,32 +170,35 @@ def test_second_order(kind: str, wave_number: float, courant: float) -> None:
 
 def water_hammer(cells: int) -> Run:
     return Run(
-        "pq", THIN, lambda t: 20e5, lambda t: 0.0, diameter=0.02, length=10.0, internal_nodes=cells - 1, max_pressure=20e5,
-        start_pressure=20e5, start_flow=area(0.02),
+        "pq", THIN, lambda t: 20e5, lambda t: 0.0, diameter=0.02, length=10.0, internal_nodes=cells - 1,
+        max_pressure=20e5, start_pressure=20e5, start_flow=area(0.02),
     )  # fmt: skip
 
 
 def test_joukowsky() -> None:
     """Stopping 1 m/s at once raises the pressure by rho a = 870 kg/m^3 * 1356.127 m/s: 11.798 bar (Joukowsky 1898).
 
-    0.3 %: density and wave speed at 20 to 32 bar (0.1 %), friction of the 10 m line (0.02 bar).
+    0.3 %, at once and until the reflection returns at 2 L/a: density and wave speed at 20 to 32 bar (0.1 %), friction
+    of the 10 m line (0.02 bar). The jump does not ring at the valve.
     """
-    run = water_hammer(80).go(80)
-    p = run.series("p_b")
-    assert p[0] - run.line.start_of(run.line.declared(Held)[0], THIN)[-1] == pytest.approx(11.798e5, rel=1.5e-3)
-    print(p[:40] / 1e5 - 20, p[40:140] / 1e5 - 20)
-    plateau = np.array(run.t) < 1.8 * 10.0 / WAVE_SPEED
-    # a discontinuity disperses: the plateau rings by a few per cent behind the front, and its mean is exact
-    assert np.mean(p[plateau]) - 20e5 == pytest.approx(11.798e5, rel=3e-3)
+    run = water_hammer(80)
+    start = run.world["p_node"][-1]
+    run.go(80)
+    rise = run.series("p_b")[np.array(run.t) < 1.8 * 10.0 / WAVE_SPEED] - start
+    assert rise == pytest.approx(np.full(len(rise), 11.798e5), rel=3e-3)
 
 
 def test_water_hammer_period() -> None:
-    """The pressure at the valve crosses the reservoir's every 2 L/a: period 4 L/a = 29.496 ms; 0.5 % over 4 periods."""
+    """The pressure at the valve crosses the reservoir's every 2 L/a = 14.748 ms, half of the period 4 L/a.
+
+    0.5 %: of the 0.2 % measured, 0.06 % are the density at 20 bar and the rest is dispersion on 40 cells.
+    """
     run = water_hammer(40).go(round(8.2 * 2 * 40 / 0.9))
     t, excess = np.array(run.t), run.series("p_b") - 20e5
     k = np.flatnonzero(excess[1:] * excess[:-1] < 0)
     crossings = t[k] + (t[k + 1] - t[k]) * excess[k] / (excess[k] - excess[k + 1])
-    print(crossings / 29.496e-3)
+    assert len(crossings) == 8
+    assert (crossings[-1] - crossings[0]) / 7 == pytest.approx(14.748e-3, rel=5e-3)
 
 
 def reflecting(cells: int, mean: float, swing: float, courant: float = 0.9) -> Run:
@@ -211,7 +214,7 @@ def reflecting(cells: int, mean: float, swing: float, courant: float = 0.9) -> R
 def test_fluid_is_kept_between_closed_ends(cells: int) -> None:
     """Closed at both ends over 1000 ticks the fluid in the line stays, and so does the bound of the wave.
 
-    The steps telescope and half cells are closed by what their ends took in, so only rounding remains: 1e-15 per tick.
+    The fluxes telescope and those at the ends close the half cells' books, so only rounding remains: 1e-15 per tick.
     """
     run = reflecting(cells, 3e5, 2e5).go(1000)
     content = run.series("content")
@@ -240,8 +243,8 @@ def test_fluid_is_kept_and_ends_are_continuous(kind: str) -> None:
     }
     at_b = {"p": lambda t: 3.8e5 + 0.2e5 * np.sin(2 * np.pi * 866 * t), "q": lambda t: -given["q"](t)}
     run = Run(
-        kind, AERATED, given[kind[0]], at_b[kind[1]], diameter=0.012, length=0.72, loss_coefficient=0.5, max_pressure=10e5,
-        start_pressure=4e5, start_flow=4e-4,
+        kind, AERATED, given[kind[0]], at_b[kind[1]], diameter=0.012, length=0.72, loss_coefficient=0.5,
+        max_pressure=10e5, start_pressure=4e5, start_flow=4e-4,
     ).go(300)  # fmt: skip
     taken = run.world["into_a"] + run.world["into_b"]
     content = run.series("content")
@@ -270,11 +273,14 @@ def settled_drop(fluid: SimpleOil, q: float, ticks: int, **values: Any) -> float
         start_pressure=20e5,
         **values,
     )
-    return 20e5 - run.go(ticks).seen[-1]["p_b"]
+    return float(20e5 - run.go(ticks).seen[-1]["p_b"])
 
 
 def test_laminar_drop() -> None:
-    """From rest the drop settles to 128 mu L q/(pi d^4) (Hagen-Poiseuille); 1e-4 remains of the start after 3000 ticks."""
+    """From rest the drop settles to 128 mu L q/(pi d^4) (Hagen-Poiseuille).
+
+    1e-4: e^-14 remains of the start after 3000 ticks; density at 20 bar cancels.
+    """
     q = 1e-4  # Re = 46
     expected = 128 * 460e-6 * 870 * 0.72 * q / (np.pi * 0.006**4)
     assert settled_drop(THICK, q, 3000) == pytest.approx(expected, rel=1e-4)
@@ -283,7 +289,7 @@ def test_laminar_drop() -> None:
 def test_turbulent_drop() -> None:
     """Started at its own steady flow, the line keeps f L/d rho v^2/2 with Churchill's f (1977), here written out.
 
-    1e-3: density at 20 bar against the one at 0 bar, 0.125 %, enters v twice and rho once.
+    2e-3: density at 20 bar is 0.125 % above the one at 0 bar; it divides the drop at equal mass flow.
     """
     q, nu = 3e-4, 2e-6
     v = q / area(0.006)
@@ -295,7 +301,10 @@ def test_turbulent_drop() -> None:
 @pytest.mark.parametrize("q", [4e-4, -4e-4])
 @pytest.mark.parametrize("kind", ["pq", "qq"])
 def test_entry_loss(q: float, kind: str) -> None:
-    """Between end a and the first node lies K rho_0 v^2/2, of the sign of the flow, in either causality; exact."""
+    """Between end a and the first node lies K rho_0 v^2/2, of the sign of the flow, in either causality.
+
+    2e-3: what rings on of the start, which is steady but for the fluid's compressibility.
+    """
     given = {"p": lambda t: 5e5, "q": lambda t: q}
     run = Run(
         kind, THIN, given[kind[0]], lambda t: -q, diameter=0.012, length=0.72, loss_coefficient=1.5, max_pressure=10e5,
@@ -319,7 +328,7 @@ def test_steady_flow_is_seen_steady() -> None:
 
 @pytest.mark.parametrize("p", [-0.9e5, -0.5e5, 0.0, 1e5, 6e5, 50e5])
 def test_pressure_of_density(p: float) -> None:
-    """Newton's method undoes rho(p): to rounding after a change by half of the absolute pressure, 10 Pa after 5 times."""
+    """Newton's method undoes rho(p): to rounding within half and double the absolute pressure, 10 Pa from 5 times."""
     absolute = p + 101325
     for factor, tolerance in ((0.5, 1e-5), (0.9, 1e-6), (1.2, 1e-6), (2.0, 1e-5), (5.0, 10.0)):
         found = pressure_of_density(AERATED.density(p), absolute * factor - 101325, AERATED)
@@ -346,7 +355,7 @@ def test_courant_number_above_one_is_seen() -> None:
 
 
 def test_number_of_nodes() -> None:
-    """Cells are six diameters long unless nodes are given: the pump's 0.72 m of 12 mm has 9 internal nodes (paper, 6)."""
+    """Cells are six diameters long unless nodes are given: the pump's 0.72 m of 12 mm has 9 (paper, section 6)."""
     pump = LaxWendroffLineTakesTakes(diameter=0.012, length=0.72, max_pressure=10e5)
     assert (pump.cells, pump.nodes) == (10, 11)
     assert LaxWendroffLineTakesTakes(diameter=0.012, length=0.05, max_pressure=10e5).cells == 2

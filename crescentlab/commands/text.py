@@ -22,21 +22,28 @@ def settings(texts: Sequence[str]) -> dict[str, str]:
     return found
 
 
-def table(rows: Iterable[Sequence[str]], *, right: Sequence[int] = (), indent: str = "") -> str:
-    """Rows as text in aligned columns, two spaces apart; ``right`` lists the columns that end flush."""
+def table(rows: Iterable[Sequence[str]], *, right: Sequence[int] = (), indent: str = "", fold: bool = False) -> str:
+    """Rows as text in aligned columns, two spaces apart.
+
+    ``right`` lists the columns that end flush; with ``fold`` the last column is folded to the terminal.
+    """
     cells = [list(row) for row in rows]
     widths = [max(len(cell) for cell in column) for column in zip(*cells, strict=True)]
-    lines = [
-        "  ".join(cell.rjust(w) if k in right else cell.ljust(w) for k, (cell, w) in enumerate(zip(row, widths, strict=True)))
-        for row in cells
-    ]
-    return "\n".join(f"{indent}{line}".rstrip() for line in lines)
+    lines: list[str] = []
+    for row in cells:
+        shown = [cell.rjust(w) if k in right else cell.ljust(w) for k, (cell, w) in enumerate(zip(row, widths, strict=True))]
+        if fold:
+            lines.append(wrapped(indent + "".join(f"{cell}  " for cell in shown[:-1]), row[-1]))
+        else:
+            lines.append(f"{indent}{'  '.join(shown)}".rstrip())
+    return "\n".join(lines)
 
 
 def wrapped(first: str, text: str) -> str:
     """``text`` after ``first``, folded to the terminal with later lines set in under it."""
-    width = min(shutil.get_terminal_size((110, 24)).columns, 130)
-    return textwrap.fill(text, max(width, len(first) + 40), initial_indent=first, subsequent_indent=" " * len(first), break_on_hyphens=False)
+    width = max(min(shutil.get_terminal_size((110, 24)).columns, 130), len(first) + 40)
+    folded = textwrap.fill(text, width, initial_indent=first, subsequent_indent=" " * len(first), break_on_hyphens=False)
+    return folded.replace("\N{NO-BREAK SPACE}", " ") if text else first.rstrip()
 
 
 def counted(number: int, singular: str, plural: str = "") -> str:

@@ -14,6 +14,7 @@ import numpy as np
 
 from crescentlab.errors import SimulationError
 from crescentlab.system import Evaluator, System, Values
+from crescentlab.units import DISPLAY
 
 EPS = float(np.finfo(float).eps)
 MAX_ROUNDS = 40
@@ -32,7 +33,8 @@ class Hybrid:
         self.start, self.end = start, stop
         self.span = stop - start
         self.bits_info = system.bits
-        self.relation = Evaluator(system.relation, values.p)
+        self.f = Evaluator(system.rhs, values.p)
+        self._relation = Evaluator(system.relation, values.p)
         self.condition = Evaluator(system.condition, values.p)
         self.n = len(system.bits.names)
         self.b = np.zeros(self.n)
@@ -49,15 +51,17 @@ class Hybrid:
         self.ticked = np.zeros(len(self.ticking), dtype=int)
         self.remap = Evaluator(system.remap, values.p) if system.events else None
         self.recent: dict[str, deque[float]] = {}
+        self.time_tolerance = max(1e-13 * self.span, 8 * EPS * max(abs(start), abs(stop)))
+        """How closely roots are located [s]."""
         self.watched = np.flatnonzero(system.bits.on_state)
         self.curved = np.flatnonzero(system.bits.on_time & ~system.bits.linear)
         self.linear = np.flatnonzero(system.bits.linear)
         self.curved_roots: list[tuple[float, int]] | None = None
 
-    @property
-    def time_tolerance(self) -> float:
-        """How closely roots are located [s]."""
-        return max(1e-13 * self.span, 8 * EPS * max(abs(self.start), abs(self.end)))
+    def relation(self, t: float, x: np.ndarray, rate: np.ndarray | None = None) -> list[np.ndarray]:
+        """Relations, their rates and magnitudes; ``rate`` is dx/dt where the caller knows it."""
+        known = self.f(t, x, self.h, self.b)[0] if rate is None else rate
+        return self._relation(t, x, self.h, self.b, known)
 
     # -- settling --------------------------------------------------------------------------------
 
@@ -65,7 +69,7 @@ class Hybrid:
         """Bits at the start: truth first, then settling."""
         if self.n:
             for _ in range(2):
-                g = self.relation(t, x, self.h, self.b)[0]
+                g = self.relation(t, x)[0]
                 self.b = np.where(self.truth(g), 1.0, 0.0)
         self.settle(t, x)
 
@@ -79,7 +83,7 @@ class Hybrid:
             return
         seen: dict[bytes, int] = {}
         for _ in range(MAX_SETTLING):
-            g, rate, scale = self.relation(t, x, self.h, self.b)
+            g, rate, scale = self.relation(t, x)
             roundoff = 16 * EPS * scale
             inside = np.abs(g) <= 2 * self.time_tolerance * np.abs(rate) + roundoff
             moving = np.abs(rate) * self.span > roundoff
@@ -137,9 +141,14 @@ class Hybrid:
         for k in fired:
             event = self.system.events[k]
             if event.kind == "fail":
-                values = np.array(self.system.function_of(event.message_names)(t, x, self.h, self.b, self.p)).ravel() if event.message_names else []
-                shown = {n.rpartition(".")[2]: v for n, v in zip(event.message_names, values, strict=False)}
-                raise SimulationError(event.message.format(**{n: float(v) for n, v in shown.items()}))
+                names = event.message_names
+                values = np.array(self.system.function_of(names)(t, x, self.h, self.b, self.p)).ravel() if names else []
+                shown = {
+                    n.rpartition(".")[2]: q.show(float(v), DISPLAY.get(q.name))
+                    for n, v in zip(names, values, strict=True)
+                    for q in [self.system.find(n).quantity]
+                }
+                raise SimulationError(event.message.format(**shown))
 
     def note(self, t: float, names: list[str]) -> None:
         """Watch for events that pile up towards an instant (Zeno)."""
@@ -169,7 +178,7 @@ class Hybrid:
         """Earliest instant after ``t`` at which a relation on time alone turns, or infinity."""
         soonest = np.inf
         if self.linear.size:
-            g, rate, _ = self.relation(t, x, self.h, self.b)
+            g, rate, _ = self.relation(t, x)
             for k in self.linear:
                 side = 1.0 if self.b[k] else -1.0
                 if side * rate[k] < 0 and (ahead := -g[k] / rate[k]) > 0:
@@ -186,7 +195,7 @@ class Hybrid:
         """All roots ahead of relations that curve in time, found on a fine grid and then closed in on."""
         times = np.linspace(t, self.end, SCAN_POINTS)
         prepared = self.system.relation
-        columns = prepared.function(times.reshape(1, -1), x, self.h, self.b, prepared.parameters(self.p))
+        columns = prepared.function(times.reshape(1, -1), x, self.h, self.b, np.zeros(x.size), prepared.parameters(self.p))
         g, rate = np.array(columns[0])[self.curved], np.array(columns[1])[self.curved]
         found: list[tuple[float, int]] = []
         for row, k in enumerate(self.curved):
@@ -198,7 +207,7 @@ class Hybrid:
         return sorted(found)
 
     def at(self, k: int, t: float, x: np.ndarray) -> tuple[float, float]:
-        g, rate, _ = self.relation(t, x, self.h, self.b)
+        g, rate, _ = self.relation(t, x)
         return float(g[k]), float(rate[k])
 
     def close_in(self, k: int, low: float, high: float, x: np.ndarray) -> float:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -16,7 +17,7 @@ from crescentlab.errors import SimulationError
 from crescentlab.solvers.hybrid import Hybrid
 from crescentlab.solvers.roots import RootFinder
 from crescentlab.solvers.scipy import Functions, Stepper, stepper
-from crescentlab.solvers.trajectory import GAUSS_NODES, Happening, Pieces, Recording, Statistics, Trajectory
+from crescentlab.solvers.trajectory import Happening, Pieces, Recording, Statistics, Trajectory
 from crescentlab.system import System, Values
 
 ANGLE_STEP = 0.3
@@ -61,8 +62,10 @@ class _Run:
         self.pieces = Pieces()
         self.happenings: list[Happening] = []
         self.warnings: list[str] = []
-        self.angles = np.array([k for k, q in enumerate(system.state_quantities) if q is units.angle], dtype=int)
+        self.angles = [k for k, q in enumerate(system.state_quantities) if q is units.angle]
         self.limits = _PressureLimits(system)
+        self.rate = np.zeros(self.functions.n)
+        """dx/dt at the end of the last step."""
         self.step_cap = min(options.max_step or np.inf, self.clock_cap(), (options.stop - options.start) / 50)
         self.tiny = 0
         self.shown_at = 0.0
@@ -135,9 +138,11 @@ class _Run:
 
     def started(self, t: float, x: np.ndarray) -> np.ndarray:
         """Restart the stepper at (t, x)."""
-        self.check_finite(t, x, self.functions.rhs(t, x), "")
+        rate = self.functions.rhs(t, x)
+        self.check_finite(t, x, rate, "")
         self.stepper.restart(t, x, self.options.stop)
-        self.roots.begin(t, x)
+        self.roots.begin(t, x, rate)
+        self.rate = rate
         return x
 
     def sync(self) -> None:
@@ -147,13 +152,14 @@ class _Run:
     def to_goal(self, t: float, x: np.ndarray, goal: float) -> tuple[float, np.ndarray]:
         """Step until the goal or an event in between; handle it; return where we are then."""
         while True:
-            bound = min(goal, t + self.cap(t, x))
+            bound = min(goal, t + self.cap())
             if goal - bound < 1e-9 * (goal - t):
                 bound = goal
             self.step(bound)
             low, high, x_high = t, self.stepper.t, self.stepper.x
+            self.rate = self.stepper.rate()
             self.check_step(low, high, x_high)
-            event = self.roots.first(low, high, x_high, self.stepper.interpolant)
+            event = self.roots.first(low, high, x_high, self.rate, self.stepper.interpolant)
             self.fill(low, high if event is None else event)
             if event is not None:
                 return self.inside(event, high, x_high)
@@ -163,14 +169,10 @@ class _Run:
             t, x = high, x_high
             self.report(t)
 
-    def cap(self, t: float, x: np.ndarray) -> float:
+    def cap(self) -> float:
         """Longest step from here."""
-        cap = self.step_cap
-        if self.angles.size:
-            fastest = np.abs(self.functions.f(t, x, self.functions.h, self.functions.b)[0][self.angles]).max()
-            if fastest > 0:
-                cap = min(cap, ANGLE_STEP / fastest)
-        return float(cap)
+        fastest = max((abs(self.rate[k]) for k in self.angles), default=0.0)
+        return min(self.step_cap, ANGLE_STEP / fastest) if fastest > 0 else self.step_cap
 
     def step(self, bound: float) -> None:
         try:
@@ -189,8 +191,8 @@ class _Run:
         if kept and t < high:
             kept = not self.f_differs(high, x_high)
             if kept and not self.hybrid.finished:
-                self.roots.begin(t, x_after)
-                event = self.roots.first(t, high, x_high, self.stepper.interpolant)
+                self.roots.begin(t, x_after, self.functions.rhs(t, x_after))
+                event = self.roots.first(t, high, x_high, self.stepper.rate(), self.stepper.interpolant)
                 self.fill(t, high if event is None else event)
                 if event is not None:
                     return self.inside(event, high, x_high)
@@ -209,7 +211,7 @@ class _Run:
             self.statistics.restarts += 1
             self.started(t, x_after)
         else:
-            self.roots.begin(t, x_after)
+            self.roots.begin(t, x_after, self.stepper.rate())
         return t, x_after
 
     def handle(self, t: float, x: np.ndarray, due: list[int]) -> tuple[np.ndarray, bool]:
@@ -258,8 +260,7 @@ class _Run:
     def fill(self, low: float, high: float) -> None:
         """Keep what lies inside the smooth piece [low, high]: Gauss nodes, and output points in [low, high)."""
         if high > low:
-            states = self.stepper.sample(low + GAUSS_NODES * (high - low))
-            self.pieces.add(low, high, states, self.hybrid.h, self.hybrid.b)
+            self.pieces.add(low, high, self.stepper.path(), self.hybrid.h, self.hybrid.b)
         if self.grid is None:
             return
         assert self.options.output_step is not None
@@ -285,7 +286,7 @@ class _Run:
     # -- checks ----------------------------------------------------------------------------------
 
     def check_step(self, low: float, high: float, x: np.ndarray) -> None:
-        if not np.all(np.isfinite(x)):
+        if not math.isfinite(x.sum()):
             self.check_finite(high, x, x, "")
         if high - low < SMALLEST_STEP * self.span:
             self.tiny += 1
@@ -323,42 +324,42 @@ class _PressureLimits:
         self.system = system
         self.states = self.of(system.state_names, system.state_quantities)
         self.held = self.of(system.held_names, system.held_quantities)
+        self.seen_h: np.ndarray | None = None
 
-    def of(self, names: list[str], quantities: list[units.Quantity]) -> list[tuple[np.ndarray, np.ndarray, list[str], list[bool]]]:
+    def of(self, names: list[str], quantities: list[units.Quantity]) -> tuple[np.ndarray, np.ndarray, list[str], list[bool]]:
+        """Places, lowest possible values, names, and whether tension is allowed, of all fluid pressures."""
         plan = self.system.plan
-        places, floors, shown, tension = [], [], [], []
+        found = []
         for k, (name, quantity) in enumerate(zip(names, quantities, strict=True)):
             owner = name.rpartition(".")[0]
-            if quantity is not units.pressure or not any(p.domain is HYDRAULIC for p in type(plan.components[owner]).ports()):
-                continue
-            if not plan.fluids[owner]:
-                continue
-            fluid = plan.design.fluids[plan.fluids[owner][0]]
-            places.append(k)
-            floors.append(-fluid.atmospheric_pressure)
-            shown.append(name)
-            tension.append(fluid.tension)
-        return [(np.array(places, dtype=int), np.array(floors), shown, tension)]
+            hydraulic = any(p.domain is HYDRAULIC for p in type(plan.components[owner]).ports())
+            if quantity is units.pressure and hydraulic and plan.fluids[owner]:
+                fluid = plan.design.fluids[plan.fluids[owner][0]]
+                found.append((k, -fluid.atmospheric_pressure * (1 + 1e-9), name, fluid.tension))
+        places, floors, shown, tension = zip(*found, strict=True) if found else ((), (), (), ())
+        lowest = np.full(len(names), -np.inf)
+        lowest[list(places)] = floors
+        return np.array(places, dtype=int), lowest, list(shown), list(tension)
 
     def check(self, t: float, x: np.ndarray, h: np.ndarray) -> str | None:
         """A warning, or an error raised; None if all pressures are possible."""
-        for vector, groups in ((x, self.states), (h, self.held)):
-            for places, floors, names, tension in groups:
-                if not places.size:
-                    continue
-                below = vector[places] < floors * (1 + 1e-9)
-                if below.any():
-                    k = int(np.flatnonzero(below)[0])
-                    said = (
-                        f"{names[k]} is {units.pressure.show(vector[places][k], 'bar')} gauge at {t:.6g} s, below absolute zero "
-                        f"({units.pressure.show(floors[k], 'bar')})"
-                    )
-                    if not tension[k]:
-                        raise SimulationError(
-                            f"{said}; the oil would cavitate: feed this volume better, or write tension: true in the fluid to go on"
-                        )
-                    return said
-        return None
+        warning = self.look(t, x, *self.states)
+        if h is not self.seen_h:
+            self.seen_h = h
+            warning = warning or self.look(t, h, *self.held)
+        return warning
+
+    def look(self, t: float, vector: np.ndarray, places: np.ndarray, floors: np.ndarray, names: list[str], tension: list[bool]) -> str | None:
+        if not (vector < floors).any():
+            return None
+        k = int(np.flatnonzero(vector[places] < floors[places])[0])
+        said = (
+            f"{names[k]} is {units.pressure.show(vector[places][k], 'bar')} gauge at {t:.6g} s, below absolute zero "
+            f"({units.pressure.show(floors[places[k]], 'bar')})"
+        )
+        if not tension[k]:
+            raise SimulationError(f"{said}; the oil would cavitate: feed this volume better, or write tension: true in the fluid to go on")
+        return said
 
 
 __all__ = ["Options", "integrate"]

@@ -22,25 +22,29 @@ class RootFinder:
     def __init__(self, hybrid: Hybrid) -> None:
         self.hybrid = hybrid
         self.watched = hybrid.watched
-        self.g = np.zeros(self.watched.size)
-        self.rate = np.zeros(self.watched.size)
-
-    def sides(self) -> np.ndarray:
+        self.every = self.watched.size == hybrid.n
+        self.side = np.zeros(self.watched.size)
         """+1 where a watched bit is true, -1 where it is false."""
-        return np.where(self.hybrid.b[self.watched] > 0.5, 1.0, -1.0)
+        self.before = np.zeros(self.watched.size)
+        self.slope = np.zeros(self.watched.size)
 
-    def read(self, t: float, x: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Values, rates and roundoff of the watched relations."""
-        g, rate, scale = self.hybrid.relation(t, x, self.hybrid.h, self.hybrid.b)
+    def read(self, t: float, x: np.ndarray, rate: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Distances of the watched relations from turning, their rates, and roundoff."""
+        g, slope, scale = self.hybrid.relation(t, x, rate)
+        if self.every:
+            return self.side * g, self.side * slope, (16 * EPS) * scale
         w = self.watched
-        return g[w], rate[w], 16 * EPS * scale[w]
+        return self.side * g[w], self.side * slope[w], 16 * EPS * scale[w]
 
-    def begin(self, t: float, x: np.ndarray) -> None:
-        """Remember the values at the beginning of a step."""
+    def begin(self, t: float, x: np.ndarray, rate: np.ndarray) -> None:
+        """Remember the values at the beginning of a step, after a stop."""
         if self.watched.size:
-            self.g, self.rate, _ = self.read(t, x)
+            self.side = np.where(self.hybrid.b[self.watched] > 0.5, 1.0, -1.0)
+            self.before, self.slope, _ = self.read(t, x, rate)
 
-    def first(self, low: float, high: float, x_high: np.ndarray, interpolant: Callable[[], Interpolant]) -> float | None:
+    def first(
+        self, low: float, high: float, x_high: np.ndarray, rate_high: np.ndarray, interpolant: Callable[[], Interpolant]
+    ) -> float | None:
         """Earliest time in (low, high] at which a relation has left its side, or None.
 
         Values at ``low`` are those of the last :meth:`begin`; if there is no root, those at ``high``
@@ -48,38 +52,37 @@ class RootFinder:
         """
         if not self.watched.size:
             return None
-        g, rate, band = self.read(high, x_high)
-        side = self.sides()
-        before, after = side * self.g, side * g
+        after, slope, band = self.read(high, x_high, rate_high)
         suspects = after < -band
-        dips = self.dips(before, after, side * self.rate * (high - low), side * rate * (high - low), band)
-        if not (suspects.any() or dips.any()):
-            self.g, self.rate = g, rate
-            return None
-        path = interpolant()
-        found = [r for k in np.flatnonzero(suspects | dips) if (r := self.locate(int(k), low, high, side[k], path)) is not None]
-        if not found:
-            self.g, self.rate = g, rate
-            return None
-        return min(found)
+        turning = (self.slope < 0) & (slope > 0)
+        if turning.any():
+            turning = self.dips(turning & (self.before > band) & ~suspects, after, slope, high - low)
+        if suspects.any() or turning.any():
+            path = interpolant()
+            places = np.flatnonzero(suspects | turning)
+            found = [r for k in places if (r := self.locate(int(k), low, high, self.side[k], path)) is not None]
+            if found:
+                return min(found)
+        self.before, self.slope = after, slope
+        return None
 
-    def dips(self, before: np.ndarray, after: np.ndarray, slope0: np.ndarray, slope1: np.ndarray, band: np.ndarray) -> np.ndarray:
-        """Relations of one side at both ends whose cubic through values and slopes comes near zero."""
-        possible = (before > band) & (after >= -band) & (slope0 < 0) & (slope1 > 0)
-        if not possible.any():
-            return possible
-        k = np.flatnonzero(possible)
-        cubic = np.outer(before[k], _H00) + np.outer(slope0[k], _H10) + np.outer(after[k], _H01) + np.outer(slope1[k], _H11)
+    def dips(self, possible: np.ndarray, after: np.ndarray, slope: np.ndarray, step: float) -> np.ndarray:
+        """Of the possible relations, those whose cubic through values and slopes at both ends comes near zero."""
         result = np.zeros_like(possible)
-        result[k] = cubic.min(axis=1) <= 0.02 * (before[k] + np.abs(after[k]))
+        k = np.flatnonzero(possible)
+        if k.size:
+            cubic = np.outer(self.before[k], _H00) + np.outer(self.slope[k] * step, _H10)
+            cubic += np.outer(after[k], _H01) + np.outer(slope[k] * step, _H11)
+            result[k] = cubic.min(axis=1) <= 0.02 * (self.before[k] + np.abs(after[k]))
         return result
 
     def locate(self, k: int, low: float, high: float, side: float, path: Interpolant) -> float | None:
         """The first time relation k is on the other side, as closely as the clock allows."""
         place = self.watched[k]
+        zeros = np.zeros(self.hybrid.system.x.numel())
 
         def value(t: float) -> float:
-            g, _, scale = self.hybrid.relation(t, path(t), self.hybrid.h, self.hybrid.b)
+            g, _, scale = self.hybrid.relation(t, path(t), zeros)
             return float(side * g[place] + 16 * EPS * scale[place])
 
         times = np.concatenate(([low], low + _S * (high - low), [high]))

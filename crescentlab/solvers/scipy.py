@@ -28,6 +28,10 @@ METHODS: dict[str, Any] = {
 }  # fmt: skip
 
 
+Path = Callable[[np.ndarray], np.ndarray]
+"""States at times, shape (times, n)."""
+
+
 class Functions:
     """f and its Jacobian of one run, with the current held values and bits."""
 
@@ -140,9 +144,7 @@ class Stepper:
         solver.status = "running"
         before = solver.t
         self.set_bound(bound)
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore")
-            message = solver.step()
+        message = solver.step()
         if solver.status == "failed":
             raise SimulationError(str(message))
         # a step cut short by the bound says nothing about the step the error would allow
@@ -152,10 +154,15 @@ class Stepper:
     def set_bound(self, bound: float) -> None:
         """Tell the solver's private parts about the bound."""
 
-    def sample(self, times: np.ndarray) -> np.ndarray:
-        """States at times within the last step, shape (times, n)."""
-        states = self.solver.dense_output()(times).T
-        return states if self.order is None else states[:, np.argsort(self.order)]
+    def rate(self) -> np.ndarray:
+        """dx/dt at the end of the last step."""
+        return self.functions.f(self.t, self.x, self.functions.h, self.functions.b)[0]
+
+    def path(self) -> Path:
+        """The states within the last step, as a function to be sampled after the run."""
+        dense, order = self.solver.dense_output(), self.order
+        back = None if order is None else np.argsort(order)
+        return lambda times: dense(times).T if back is None else dense(times).T[:, back]
 
     def interpolant(self) -> Callable[[float], np.ndarray]:
         """x(t) within the last step."""
@@ -166,19 +173,41 @@ class Stepper:
 class _Lsoda(Stepper):
     """LSODA's critical time follows the bound, so a continued run never overshoots it."""
 
-    def set_bound(self, bound: float) -> None:
-        self.solver._lsoda_solver._integrator.rwork[0] = bound
+    def restart(self, t: float, x: np.ndarray, bound: float) -> None:
+        super().restart(t, x, bound)
+        self.work = self.solver._lsoda_solver._integrator.rwork
 
-    def sample(self, times: np.ndarray) -> np.ndarray:
-        # the Nordsieck polynomial read in place: a tenth of the cost of a dense_output object
-        integrator = self.solver._lsoda_solver._integrator
-        work, order, n = integrator.rwork, int(integrator.iwork[13]), self.functions.n
-        history = work[20 : 20 + (order + 1) * n].reshape(order + 1, n)
-        powers = ((times - self.solver.t) / work[11])[:, None] ** np.arange(order + 1)
-        if integrator.iwork[14] < order:
-            powers[:, -1] *= (work[11] / work[10]) ** order
-        states = powers @ history
-        return states if self.order is None else states[:, np.argsort(self.order)]
+    def set_bound(self, bound: float) -> None:
+        self.work[0] = bound
+
+    def rate(self) -> np.ndarray:
+        # second column of the Nordsieck array: h dx/dt, known without a call of f
+        work, n = self.work, self.functions.n
+        return self.outer(work[20 + n : 20 + 2 * n] / work[11])
+
+    def path(self) -> Path:
+        # a copy of the Nordsieck array costs a tenth of a dense_output object
+        integrator, n = self.solver._lsoda_solver._integrator, self.functions.n
+        work, order = integrator.rwork, int(integrator.iwork[13])
+        scale = (work[11] / work[10]) ** order if integrator.iwork[14] < order else 1.0
+        back = None if self.order is None else np.argsort(self.order)
+        return _Nordsieck(self.solver.t, work[11], work[20 : 20 + (order + 1) * n].copy(), n, scale, back)
+
+
+class _Nordsieck:
+    """x(t) = sum over k of y_k ((t - t_n)/h)^k, the polynomial of one LSODA step."""
+
+    __slots__ = ("back", "h", "history", "n", "scale", "t")
+
+    def __init__(self, t: float, h: float, history: np.ndarray, n: int, scale: float, back: np.ndarray | None) -> None:
+        self.t, self.h, self.history, self.n, self.scale, self.back = t, h, history, n, scale, back
+
+    def __call__(self, times: np.ndarray) -> np.ndarray:
+        rows = self.history.reshape(-1, self.n)
+        powers = ((times - self.t) / self.h)[:, None] ** np.arange(len(rows))
+        powers[:, -1] *= self.scale  # the last row is scaled for the next step where the order falls
+        states = powers @ rows
+        return states if self.back is None else states[:, self.back]
 
 
 class _Stateless(Stepper):
@@ -199,8 +228,9 @@ class _Stateless(Stepper):
         self.step_size = bound - self.at
         self.at = bound
 
-    def sample(self, times: np.ndarray) -> np.ndarray:
-        return np.tile(self.state, (times.size, 1))
+    def path(self) -> Path:
+        state = self.state
+        return lambda times: np.tile(state, (times.size, 1))
 
     def interpolant(self) -> Callable[[float], np.ndarray]:
         return lambda _: self.state

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -60,21 +61,25 @@ GAUSS_WEIGHTS = np.array([5.0, 8.0, 5.0]) / 18
 
 @dataclass
 class Pieces:
-    """Inner points of every smooth piece of a run, for integrals: three Gauss nodes a piece."""
+    """The smooth pieces of a run with the solver's own interpolants, for integrals over time."""
 
     low: list[float] = field(default_factory=list)
     high: list[float] = field(default_factory=list)
-    x: list[np.ndarray] = field(default_factory=list)
+    path: list[Callable[[np.ndarray], np.ndarray]] = field(default_factory=list)
     h: list[np.ndarray] = field(default_factory=list)
     b: list[np.ndarray] = field(default_factory=list)
 
-    def add(self, low: float, high: float, x: np.ndarray, h: np.ndarray, b: np.ndarray) -> None:
-        """Append the piece [low, high] with its states at the nodes, shape (3, n)."""
+    def add(self, low: float, high: float, path: Callable[[np.ndarray], np.ndarray], h: np.ndarray, b: np.ndarray) -> None:
+        """Append the piece [low, high]; ``path(times)`` gives states, shape (times, n)."""
         self.low.append(low)
         self.high.append(high)
-        self.x.append(x)
+        self.path.append(path)
         self.h.append(h)
         self.b.append(b)
+
+    def at_nodes(self) -> np.ndarray:
+        """States at the Gauss nodes of every piece, shape (pieces, 3, n)."""
+        return np.array([path(low + GAUSS_NODES * (high - low)) for path, low, high in zip(self.path, self.low, self.high, strict=True)])
 
 
 @dataclass
