@@ -302,7 +302,7 @@ def _read_netcdf(path: Path) -> tuple[np.ndarray, dict[str, np.ndarray], dict[st
     with h5py.File(path, "r") as file:
         series = {n: np.array(v) for n, v in file.items()}
         units = {n: str(v.attrs.get("units", "")) for n, v in file.items()}
-        attributes = {k: v.item() if hasattr(v, "item") else v for k, v in file.attrs.items()}
+        attributes = {k: v.item() if hasattr(v, "item") else v for k, v in file.attrs.items() if k[0] != "_"}
     return series.pop("time"), series, units, attributes
 
 

@@ -128,7 +128,8 @@ def summary(result: Result, target: Path | None, record: list[str], pictures: li
             rows.append(("merged", f"{QUANTITIES['volume'].show(merged, 'cm3', 3)} moved by events"))
     parts = [result.title, table(rows, indent="  ")]
     if figures := _figures(result):
-        parts.append(table(figures, right=(2, 3, 4, 5), indent="  "))
+        more = len(result.net_pressures()) - MAX_NETS
+        parts.append(table(figures, right=(2, 3, 4, 5), indent="  ") + (f"\n  and {counted(more, 'net')} more" if more > 0 else ""))
     parts += [f"  warning: {warning}" for warning in t.warnings]
     written = [f"  wrote {path}" for path in pictures]
     if target is not None:
