@@ -71,12 +71,8 @@ def plan(graph: Graph, library: Library, *, allow_open: bool = False) -> Plan:
 
 def _role(components: dict[str, Component], member: Member) -> str:
     """The port's role in the chosen form."""
-    port = _port(components[member.instance], member.port.name)
+    port = type(components[member.instance]).port_named(member.port.name)
     return port.role
-
-
-def _port(component: Component, name: str) -> Port:
-    return next(p for p in type(component).ports() if p.name == name)
 
 
 # -- forms of flexible components ----------------------------------------------------------------
@@ -250,17 +246,17 @@ def _sources(
         giver = givers[net.name]
         takers = [m for m in net.members if _role(components, m) == "takes"]
         for member in net.members:
-            port = _port(components[member.instance], member.port.name)
+            port = type(components[member.instance]).port_named(member.port.name)
             layout = traces[member.instance].inputs
             for (name, _), k in zip(port.inputs(), range(9), strict=False):
                 if member is giver:
                     sign = 1.0 if net.domain is CHAMBER else -1.0
-                    outputs = tuple(output(m, _port(components[m.instance], m.port.name).outputs()[k][0]) for m in takers)
+                    outputs = tuple(output(m, type(components[m.instance]).port_named(m.port.name).outputs()[k][0]) for m in takers)
                     source = Source(outputs, sign)
                 elif giver is None:
                     source = nothing
                 else:
-                    source = Source((output(giver, _port(components[giver.instance], giver.port.name).outputs()[k][0]),), 1.0)
+                    source = Source((output(giver, type(components[giver.instance]).port_named(giver.port.name).outputs()[k][0]),), 1.0)
                 found[member.instance][layout.offsets[name][0] + member.element] = source
     return {name: tuple(sources) for name, sources in found.items()}
 

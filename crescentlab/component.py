@@ -24,6 +24,7 @@ Every ``q`` is positive **into** the component that owns the port, every force a
 
 from __future__ import annotations
 
+import functools
 import inspect
 import re
 import types
@@ -73,17 +74,17 @@ class Component(BaseModel):
     @classmethod
     def declared(cls, kind: type[Declared]) -> list[Any]:
         """The class's ports, states, held values or observables, in the order written."""
-        found: dict[str, Any] = {}
-        for base in reversed(cls.__mro__):
-            for name, value in vars(base).items():
-                if isinstance(value, Declared):
-                    found[name] = value
-        return [value for value in found.values() if isinstance(value, kind)]
+        return list(_declared(cls, kind))
 
     @classmethod
     def ports(cls) -> list[Port]:
         """Ports in the order written."""
-        return cls.declared(Port)
+        return list(_declared(cls, Port))
+
+    @classmethod
+    def port_named(cls, name: str) -> Port:
+        """The port called ``name``."""
+        return next(p for p in _declared(cls, Port) if p.name == name)
 
     @classmethod
     def forms(cls) -> list[type[Component]]:
@@ -93,7 +94,7 @@ class Component(BaseModel):
     @classmethod
     def asks_for(cls) -> list[str]:
         """Names of the arguments of ``equations``."""
-        return [p for p in inspect.signature(cls.equations).parameters if p != "self"]
+        return list(_arguments(cls))
 
     @classmethod
     def type_name(cls) -> str:
@@ -126,6 +127,27 @@ class Component(BaseModel):
             value = start
         n = self.size_of(declared.size)
         return np.broadcast_to(np.asarray(value, dtype=float), (1 if n is None else n,)).copy()
+
+
+@functools.cache
+def _declared(cls: type[Component], kind: type[Declared]) -> tuple[Any, ...]:
+    found: dict[str, Any] = {}
+    for base in reversed(cls.__mro__):
+        for name, value in vars(base).items():
+            if isinstance(value, Declared):
+                found[name] = value
+    return tuple(value for value in found.values() if isinstance(value, kind))
+
+
+@functools.cache
+def _arguments(cls: type[Component]) -> tuple[str, ...]:
+    return tuple(p for p in inspect.signature(cls.equations).parameters if p != "self")
+
+
+@functools.cache
+def structural_fields(model: type[BaseModel]) -> frozenset[str]:
+    """Names of the fields of a component or fluid class that shape its equations."""
+    return frozenset(name for name, field in model.model_fields.items() if is_structural(field))
 
 
 def snake_case(name: str) -> str:
@@ -219,7 +241,7 @@ def _check_class(cls: type[Component]) -> None:
 
 def _claim(taken: dict[str, str], names: Iterable[str], owner: str, where: str) -> None:
     for name in names:
-        if name in RESERVED:
+        if name in RESERVED or hasattr(Component, name):
             raise ComponentError(f"{where}: {owner} may not be called {name!r}, which equations use for something else")
         if name in taken:
             raise ComponentError(f"{where}: {owner} and {taken[name]} are both called {name!r}; rename one")

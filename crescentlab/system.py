@@ -17,7 +17,7 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
-from crescentlab.causality import Plan, Source, _port
+from crescentlab.causality import Plan, Source
 from crescentlab.component import Component
 from crescentlab.domain import HYDRAULIC, SIGNAL, Held, Observable, State
 from crescentlab.elaborate import Design, Output
@@ -87,10 +87,22 @@ class Prepared:
     parameters: ca.Function
 
 
+CSE_LIMIT = 20_000
+"""Expressions of more instructions are not searched for common parts: the search grows faster than they do."""
+
+
+def _shared(expression: ca.SX) -> ca.SX:
+    """``expression`` with common subexpressions computed once, if it is small enough to search."""
+    free = ca.symvar(expression)
+    if not expression.numel() or ca.Function("count", [ca.vertcat(*free)], [expression]).n_instructions() > CSE_LIMIT:
+        return expression
+    return ca.cse(expression)
+
+
 def prepare(name: str, arguments: list[ca.SX], p: ca.SX, outputs: list[ca.SX]) -> Prepared:
     """Share common subexpressions of the outputs and hoist what depends on ``p`` alone."""
     sizes = [o.numel() for o in outputs]
-    shared = ca.cse(ca.densify(_cat(outputs)))
+    shared = _shared(ca.densify(_cat(outputs)))
     rest, symbols, parametric = ca.extract_parametric(shared, p, {"extract_trivial": True})
     q = _cat(symbols)
     pieces = ca.vertsplit(rest, [0, *np.cumsum(sizes).tolist()]) if rest.numel() else [ca.SX(0, 1) for _ in sizes]
@@ -160,7 +172,7 @@ class System:
     held_names: list[str]
     held_quantities: list[Quantity]
     bits: Bits
-    variables: dict[str, Variable]
+    _variables: Callable[[], dict[str, Variable]]
     _remap: Callable[[], tuple[ca.SX, list[ca.SX]]]
     _contents: dict[str, tuple[Callable[[], ca.SX], Callable[[], tuple[ca.SX, ca.SX]]]]
     _functions: dict[Any, ca.Function] = field(default_factory=dict)
@@ -169,6 +181,11 @@ class System:
     def arguments(self) -> list[ca.SX]:
         """Symbols every function of the system takes, in order."""
         return [self.t, self.x, self.h, self.b, self.p]
+
+    @functools.cached_property
+    def variables(self) -> dict[str, Variable]:
+        """Every name a result knows."""
+        return self._variables()
 
     @functools.cached_property
     def rhs(self) -> Prepared:
@@ -322,13 +339,14 @@ class _Assembly:
         clock = _cat([self.call(n, tr.clock, self.inputs[n]) for n, tr in plan.traces.items() if tr.clock.numel_out(0)])
         relations, scales = self.relations()
         events, conditions, periods = self.events()
-        variables = self.variables()
-        extra = self.stop(variables, events, conditions, relations, scales)
+        if plan.design.outputs:
+            self.variables()  # a wrong output is told before the run
+        extra = self.stop(events, conditions, relations, scales)
         b = ca.vertcat(self.b_local, extra)
-        derivative, g = ca.vertsplit(ca.cse(ca.densify(_cat([derivative, *relations]))), [0, derivative.numel(), derivative.numel() + _cat(relations).numel()])
+        derivative, g = ca.vertsplit(_shared(ca.densify(_cat([derivative, *relations]))), [0, derivative.numel(), derivative.numel() + _cat(relations).numel()])
         return System(
             plan, self.t, self.x, self.h, b, self.p, derivative, g, _cat(scales), _cat(conditions), _cat(periods), clock, tuple(events),
-            *self.names(State), self.nominal(), *self.names(Held), self.bits(g, b), variables,
+            *self.names(State), self.nominal(), *self.names(Held), self.bits(g, b), self.variables,
             self.remap, self.contents(),
         )  # fmt: skip
 
@@ -382,7 +400,7 @@ class _Assembly:
         return events, conditions, periods
 
     def stop(
-        self, variables: dict[str, Variable], events: list[SystemEvent], conditions: list[ca.SX], relations: list[ca.SX], scales: list[ca.SX]
+        self, events: list[SystemEvent], conditions: list[ca.SX], relations: list[ca.SX], scales: list[ca.SX]
     ) -> ca.SX:
         """Append the relations of ``stop_when``; return their bits."""
         netlist = self.plan.design.netlist
@@ -397,7 +415,7 @@ class _Assembly:
             return found[-1][1]
 
         try:
-            value = evaluate(text, self.lookup(variables, ""))
+            value = evaluate(text, self.lookup(self.variables(), ""))
             if not isinstance(value.value, Condition):
                 raise ExpressionError(f"{text!r} is no condition on the circuit's variables; write for example line.p > 9 bar")
         except InputError as error:
@@ -446,6 +464,7 @@ class _Assembly:
 
     # -- variables -------------------------------------------------------------------------------
 
+    @functools.cache  # noqa: B019 - an assembly lives as long as its system
     def variables(self) -> dict[str, Variable]:
         """Every name a result knows."""
         found: dict[str, Variable] = {}
@@ -510,7 +529,7 @@ class _Assembly:
     def across(self, givers: list[Any], k: int) -> list[ca.SX]:
         found: list[ca.SX] = []
         for giver in givers:
-            port = _port(self.plan.components[giver.instance], giver.port.name)
+            port = type(self.plan.components[giver.instance]).port_named(giver.port.name)
             layout = self.plan.traces[giver.instance].outputs
             found.append(self.outputs[giver.instance][layout.offsets[port.outputs()[k][0]][0] + giver.element])
         return found
@@ -598,6 +617,8 @@ def _split(name: str, sizes: list[int]) -> tuple[ca.SX, list[ca.SX]]:
 
 
 def _cat(items: list[ca.SX]) -> ca.SX:
+    if len(items) == 1:
+        return items[0]
     filled = [i for i in items if i.numel()]
     return ca.vertcat(*filled) if filled else ca.SX(0, 1)
 

@@ -15,7 +15,7 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
-from crescentlab.component import Component, check_returned, fluid_names, is_structural
+from crescentlab.component import Component, check_returned, fluid_names, structural_fields
 from crescentlab.domain import HYDRAULIC, Held, Observable, State
 from crescentlab.errors import ComponentError
 from crescentlab.fluid import Fluid
@@ -121,18 +121,19 @@ class Trace:
 
 def numeric_fields(model: type[Any], values: Any) -> tuple[str, ...]:
     """Fields that stay symbolic: floats that are given and not structural."""
-    return tuple(n for n, f in model.model_fields.items() if not is_structural(f) and getattr(values, n) is not None)
+    structural = structural_fields(model)
+    return tuple(n for n in model.model_fields if n not in structural and getattr(values, n) is not None)
 
 
 def structure_of(model: Any) -> tuple[Any, ...]:
     """What of a component or fluid shapes its equations."""
     cls = type(model)
-    fixed = tuple(
-        (n, _hashable(getattr(model, n)) if is_structural(f) else None)
-        for n, f in cls.model_fields.items()
-        if is_structural(f) or getattr(model, n) is None
+    structural = structural_fields(cls)
+    return cls, tuple(
+        (n, _hashable(value) if n in structural else None)
+        for n in cls.model_fields
+        if (value := getattr(model, n)) is None or n in structural
     )
-    return cls, fixed
 
 
 def _hashable(value: Any) -> Any:
@@ -166,6 +167,7 @@ class _Bits:
         return symbol
 
 
+@functools.cache
 def fluids_asked(cls: type[Component]) -> tuple[str, ...]:
     """The fluid arguments of a class's equations, in order."""
     asked = set(cls.asks_for())

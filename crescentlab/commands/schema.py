@@ -36,6 +36,9 @@ def schema(library: Library) -> dict[str, Any]:
     fluid = {"$ref": "#/$defs/FluidSection"}
     made["properties"]["fluid"] = {**fluid, "description": "the one fluid"}
     made["properties"]["fluids"] = {"type": "object", "additionalProperties": fluid, "description": "several fluids by name; nets choose"}
+    known = {"anyOf": [{"enum": [name for name in listed(library) if name in library.components]}, {"pattern": r"\.ya?ml$"}]}
+    made["if"] = {"not": {"required": ["library"]}}  # without components of the user's own, every type is known
+    made["then"] = {"properties": {"components": {"additionalProperties": {"properties": {"type": known}}}}}
     return made
 
 
