@@ -98,7 +98,7 @@ def _forms(graph: Graph, allow_open: bool) -> dict[str, Component]:
 
 def _match(ends: dict[tuple[str, str, int], Net], fixed: dict[str, bool]) -> set[tuple[str, str, int]]:
     """Undecided ends that give: one for every net without a giver of its own."""
-    matching = nx.Graph()
+    matching: nx.Graph[Any] = nx.Graph()
     needy = {net.name for net in ends.values() if not fixed[net.name]}
     matching.add_nodes_from(("net", n) for n in needy)
     matching.add_edges_from((("net", net.name), ("end", *key)) for key, net in ends.items() if net.name in needy)

@@ -16,7 +16,7 @@ from typing import Any, get_args
 from crescentlab.causality import Plan, plan
 from crescentlab.component import field_quantity
 from crescentlab.elaborate import Design, elaborate
-from crescentlab.errors import InputError, SimulationError, nearest
+from crescentlab.errors import InputError, SimulationError, UnitError, nearest
 from crescentlab.fluid import Fluid
 from crescentlab.graph import build
 from crescentlab.library import Library, installed
@@ -25,7 +25,7 @@ from crescentlab.result import Result
 from crescentlab.solvers.loop import Options, integrate
 from crescentlab.system import System, assemble
 from crescentlab.trace import structure_of
-from crescentlab.units import QUANTITIES, UnitError
+from crescentlab.units import QUANTITIES
 
 SOLVERS: tuple[str, ...] = get_args(SimulationSection.model_fields["solver"].annotation)
 """Names of ``--solver`` and ``solver:``."""

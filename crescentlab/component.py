@@ -84,7 +84,7 @@ class Component(BaseModel):
     @classmethod
     def port_named(cls, name: str) -> Port:
         """The port called ``name``."""
-        return next(p for p in _declared(cls, Port) if p.name == name)
+        return next(p for p in cls.ports() if p.name == name)
 
     @classmethod
     def forms(cls) -> list[type[Component]]:
@@ -122,7 +122,8 @@ class Component(BaseModel):
         if isinstance(start, str):
             value = getattr(self, start)
         elif callable(start):
-            value = start(self, fluid) if len(inspect.signature(start).parameters) == 2 else start(self)
+            function: Callable[..., Any] = start
+            value = function(self, fluid) if len(inspect.signature(function).parameters) == 2 else function(self)
         else:
             value = start
         n = self.size_of(declared.size)

@@ -56,7 +56,7 @@ class Declared:
         self.name = name
 
 
-@dataclass
+@dataclass(eq=False)
 class Port(Declared):
     """A place where a component meets a net; ``size`` makes it a vector."""
 
@@ -155,7 +155,7 @@ def takes_signal(quantity: Any, description: str, *, size: Size | None = None) -
     return Port(SIGNAL, "takes", description, size, quantity if isinstance(quantity, str) else units.quantity_of(quantity))
 
 
-@dataclass
+@dataclass(eq=False)
 class State(Declared):
     """A continuous state: ``der_<name>`` must be returned."""
 
@@ -166,7 +166,7 @@ class State(Declared):
     size: Size | None = None
 
 
-@dataclass
+@dataclass(eq=False)
 class Held(Declared):
     """A value that changes only at events."""
 
@@ -176,7 +176,7 @@ class Held(Declared):
     size: Size | None = None
 
 
-@dataclass
+@dataclass(eq=False)
 class Observable(Declared):
     """A returned value that a result can show; ``stored`` marks a component's fluid content."""
 

@@ -283,12 +283,12 @@ class _Elaboration:
                 keep, drop = sorted((a, b), key=lambda n: (n.count("."), list(self.nets).index(n)))
                 parent[drop] = keep
         for name, net in self.nets.items():
-            keep = self.nets[root(name)]
-            if keep is not net:
-                keep.ports += net.ports
-                keep.aliases.append(name)
-                keep.fluid = keep.fluid or net.fluid
-                keep.open = keep.open or net.open
+            kept = self.nets[root(name)]
+            if kept is not net:
+                kept.ports += net.ports
+                kept.aliases.append(name)
+                kept.fluid = kept.fluid or net.fluid
+                kept.open = kept.open or net.open
         return [net for name, net in self.nets.items() if root(name) == name]
 
 

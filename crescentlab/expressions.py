@@ -19,9 +19,9 @@ from typing import Any
 import numpy as np
 
 from crescentlab import maths
-from crescentlab.errors import ExpressionError, nearest
+from crescentlab.errors import ExpressionError, UnitError, nearest
 from crescentlab.symbols import Condition, Sym
-from crescentlab.units import NO_DIMS, QUANTITIES, Dims, Quantity, UnitError, parse_any, quantity_with, ratio, si_unit
+from crescentlab.units import NO_DIMS, QUANTITIES, Dims, Quantity, parse_any, quantity_with, ratio, si_unit
 
 MAX_LENGTH = 2000
 
@@ -144,7 +144,7 @@ def _divide(a: Any, b: Any) -> Any:
 
 _PLAIN = {"sin": maths.sin, "cos": maths.cos, "tan": maths.tan, "asin": maths.asin, "acos": maths.acos, "atan": maths.atan,
           "exp": maths.exp, "log": maths.log, "tanh": maths.tanh, "sinh": maths.sinh, "cosh": maths.cosh}  # fmt: skip
-_WHOLE: dict[str, Callable[[float], float]] = {"floor": math.floor, "ceil": math.ceil, "round": round}
+_WHOLE: dict[str, Callable[[float], float]] = {"floor": math.floor, "ceil": math.ceil, "round": lambda x: round(x)}
 _SAME = {"min": maths.minimum, "max": maths.maximum}
 _REDUCE = {"sum": maths.total, "mean": lambda v: maths.total(v) / len(v)}
 FUNCTIONS = sorted([*_PLAIN, *_WHOLE, *_SAME, *_REDUCE, "abs", "sqrt", "where", "involute", "atan2"])

@@ -51,7 +51,7 @@ class Graph:
 
     design: Design
     nets: list[Net]
-    graph: nx.MultiGraph
+    graph: nx.MultiGraph[tuple[str, str]]
 
     def quantity(self, member: Member) -> Quantity:
         """The quantity a signal port carries."""
@@ -61,7 +61,7 @@ class Graph:
 def build(design: Design) -> Graph:
     """Unroll vector ports and check every net; raises :class:`InputError` naming the port."""
     nets = [net for source in design.nets for net in _unrolled(design, source)]
-    graph = nx.MultiGraph()
+    graph: nx.MultiGraph[tuple[str, str]] = nx.MultiGraph()
     graph.add_nodes_from((("component", name) for name in design.instances), bipartite=0)
     graph.add_nodes_from((("net", net.name) for net in nets), bipartite=1)
     graph.add_edges_from((("component", m.instance), ("net", net.name), {"member": m}) for net in nets for m in net.members)

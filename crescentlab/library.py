@@ -84,7 +84,7 @@ def installed() -> Library:
 def _put(components: dict[str, type[Component]], fluids: dict[str, type[Fluid]], name: str, found: type) -> None:
     if issubclass(found, Component):
         components[name] = found
-    else:
+    elif issubclass(found, Fluid):
         fluids[name] = found
 
 

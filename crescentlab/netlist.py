@@ -15,8 +15,8 @@ from typing import Annotated, Any, Literal, TypeVar
 from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Field, ValidationError
 
 from crescentlab.component import field_quantity
-from crescentlab.errors import InputError, Place, nearest
-from crescentlab.units import QUANTITIES, Time, UnitError
+from crescentlab.errors import InputError, Place, UnitError, nearest
+from crescentlab.units import QUANTITIES, Time
 from crescentlab.yaml_text import Node, quoted, read
 
 

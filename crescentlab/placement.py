@@ -21,7 +21,10 @@ LENGTH = 1.15
 """Mean length of a line [inch]."""
 GAP = 0.14
 """Least distance of boxes [inch]."""
-MOVES = 6000
+MOVES = 100
+"""Attempts to improve per box, ..."""
+MOST_MOVES = 3600
+"""... and in all."""
 LARGE = 250
 """Above this number of boxes the quick layout has to do."""
 
@@ -52,19 +55,25 @@ def _part(graph: nx.Graph, sizes: Sizes) -> Places:
     if len(nodes) > LARGE:
         starts = [nx.spring_layout(ordered, seed=1)]
     else:
-        starts = [nx.kamada_kawai_layout(ordered, pos=start) for start in (nx.circular_layout(ordered), nx.spectral_layout(ordered))]
-    best: tuple[float, np.ndarray] | None = None
-    for start in starts:
-        at = _turned(np.array([start[n] for n in nodes]))
-        at *= LENGTH / max(float(np.mean(np.hypot(*(at[lines[:, 0]] - at[lines[:, 1]]).T))), 1e-9)
-        at = _apart(at * (STRETCH, 1.0), size)
-        if len(nodes) <= LARGE:
-            at = _apart(_Improving(at, size, lines).run(), size)
-        cost = _Improving(at, size, lines).cost()
-        if best is None or cost < best[0]:
-            best = cost, at
-    assert best is not None
-    return {n: (float(x), float(y)) for n, (x, y) in zip(nodes, best[1], strict=True)}
+        starts = [nx.kamada_kawai_layout(ordered, pos=start) for start in (nx.circular_layout(ordered), _jittered(nx.spectral_layout(ordered)))]
+    drawn = [_spread(np.array([start[n] for n in nodes]), size, lines) for start in starts]
+    at = min(drawn, key=lambda each: _Improving(each, size, lines).cost())
+    if len(nodes) <= LARGE:
+        at = _apart(_Improving(at, size, lines).run(), size)
+    return {n: (float(x), float(y)) for n, (x, y) in zip(nodes, at, strict=True)}
+
+
+def _jittered(start: dict[Hashable, np.ndarray]) -> dict[Hashable, np.ndarray]:
+    """A start in which no two stand in the same place."""
+    chance = np.random.default_rng(3)
+    return {n: at + chance.normal(0, 1e-3, 2) for n, at in start.items()}
+
+
+def _spread(at: np.ndarray, size: np.ndarray, lines: np.ndarray) -> np.ndarray:
+    """A layout in inches, turned to be wide, without overlaps."""
+    at = _turned(at)
+    mean = float(np.mean(np.hypot(*(at[lines[:, 0]] - at[lines[:, 1]]).T)))
+    return _apart(at * LENGTH / max(mean, 1e-9) * (STRETCH, 1.0), size)
 
 
 def _turned(at: np.ndarray) -> np.ndarray:
@@ -108,9 +117,10 @@ class _Improving:
         """Try random moves, fewer and shorter towards the end; keep what helps."""
         chance = np.random.default_rng(7)
         count = len(self.at)
-        for turn in range(MOVES):
+        moves = min(MOVES * count, MOST_MOVES)
+        for turn in range(moves):
             one = int(chance.integers(count))
-            reach = 2.5 * (1 - turn / MOVES) + 0.1
+            reach = 2.5 * (1 - turn / moves) + 0.1
             if chance.random() < 0.25:
                 other = int(chance.integers(count))
                 self.attempt([one, other], self.at[[other, one]])

@@ -126,6 +126,7 @@ def _figure(shown: Sheet, title: str) -> Any:
 
 def _draw_lines(axes: Any, shown: Sheet, places: Any, sizes: Any) -> None:
     joined: dict[Any, int] = {}
+    texts: list[tuple[float, float, float]] = []
     for line in shown.lines:
         (x0, y0), (x1, y1) = places[line.component], _dot(places[line.net])
         joined[line.component, line.net] = joined.get((line.component, line.net), -1) + 1
@@ -133,17 +134,27 @@ def _draw_lines(axes: Any, shown: Sheet, places: Any, sizes: Any) -> None:
         style = {"linestyle": (0, (3, 2))} if line.role == "reads" else {}
         width = 2.4 if line.role == "gives" else 1.1
         axes.plot([x0 + shift, x1], [y0, y1], color=COLOURS[line.domain], linewidth=width, zorder=1, solid_capstyle="round", **style)
-        fx, fy = _edge(x1 - x0 - shift, y1 - y0, *sizes[line.component])
+        tx, ty = _beside(x0 + shift, y0, x1, y1, sizes[line.component], len(line.port) * 0.025 + 0.03, texts)
         axes.text(
-            x0 + shift + fx, y0 + fy, line.port, fontsize=5.5, color=COLOURS[line.domain], ha="center", va="center", zorder=4,
+            tx, ty, line.port, fontsize=5.5, color=COLOURS[line.domain], ha="center", va="center", zorder=4,
             bbox={"boxstyle": "square,pad=0.08", "facecolor": "white", "edgecolor": "none"},
         )  # fmt: skip
 
 
-def _edge(dx: float, dy: float, width: float, height: float) -> tuple[float, float]:
-    """Where a line leaves a box, a little outside of it."""
-    reach = min((width / 2 + 0.13) / max(abs(dx), 1e-9), (height / 2 + 0.07) / max(abs(dy), 1e-9), 0.6)
-    return dx * reach, dy * reach
+def _beside(
+    x0: float, y0: float, x1: float, y1: float, size: tuple[float, float], half: float, texts: list[tuple[float, float, float]]
+) -> tuple[float, float]:
+    """Where a port's name stands on its line: just outside the box, further out where other names stand."""
+    dx, dy = x1 - x0, y1 - y0
+    first = min((size[0] / 2 + half) / max(abs(dx), 1e-9), (size[1] / 2 + 0.07) / max(abs(dy), 1e-9), 0.6)
+    step = 0.06 / max((dx * dx + dy * dy) ** 0.5, 1e-9)
+    for k in range(8):
+        share = min(first + k * step, 0.8)
+        x, y = x0 + share * dx, y0 + share * dy
+        if all(abs(x - tx) > half + other or abs(y - ty) > 0.1 for tx, ty, other in texts):
+            break
+    texts.append((x, y, half))
+    return x, y
 
 
 def _draw_boxes(axes: Any, shown: Sheet, places: Any, sizes: Any) -> None:

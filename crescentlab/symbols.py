@@ -146,8 +146,8 @@ class Sym:
     def __float__(self) -> float:
         raise TypeError("a symbol has no value while equations are traced; use crescentlab.maths instead of math or float()")
 
-    __int__ = __float__  # type: ignore[assignment]
-    __index__ = __float__  # type: ignore[assignment]
+    __int__ = __float__
+    __index__ = __float__
 
     def __bool__(self) -> bool:
         raise TypeError("a symbol is neither true nor false while equations are traced; use where() instead of if")

@@ -124,9 +124,9 @@ class Evaluator:
         self.last_b: Array | None = None
         self.inputs[-1][: self.sizes[-1]] = np.array(prepared.parameters(p)).ravel()
         for k, array in enumerate(self.inputs):
-            self.buffer.set_arg(k, memoryview(array))
+            self.buffer.set_arg(k, memoryview(array))  # type: ignore[call-arg, arg-type]  # CasADi's stub omits the view
         for k, array in enumerate(self.outputs):
-            self.buffer.set_res(k, memoryview(array))
+            self.buffer.set_res(k, memoryview(array))  # type: ignore[call-arg, arg-type]
 
     def __call__(self, t: float, x: Array, h: Array, b: Array, extra: Array | None = None) -> list[Array]:
         """Evaluate; the returned arrays are overwritten by the next call.
@@ -485,20 +485,20 @@ class _Assembly:
         cls = type(component)
         for kind, layout, column in ((State, trace.states, xs), (Held, trace.held, hs)):
             for declared in cls.declared(kind):
-                yield _variable(f"{name}.{declared.name}", component.quantity(declared.quantity), layout, declared.name, lambda c=column: c)
+                yield _variable(f"{name}.{declared.name}", component.quantity(declared.quantity), layout, declared.name, functools.partial(_itself, column))
         for declared in cls.declared(Observable):
             yield _variable(
                 f"{name}.{declared.name}", component.quantity(declared.quantity), trace.observables, declared.name,
                 functools.partial(self.observe, name),
             )  # fmt: skip
         for port in cls.ports():
-            for layout, column, pairs in (
+            for layout, values, pairs in (
                 (trace.outputs, functools.partial(self.output_column, name), port.outputs()),
                 (trace.inputs, functools.partial(self.inputs.__getitem__, name), port.inputs()),
             ):
                 for variable, quantity in pairs:
                     shown = f"{name}.{port.name}" if port.domain is SIGNAL else f"{name}.{port.name}.{variable.removesuffix('_' + port.name)}"
-                    yield _variable(shown, component.quantity(quantity), layout, variable, column)
+                    yield _variable(shown, component.quantity(quantity), layout, variable, values)
 
     def observe(self, name: str) -> ca.SX:
         if name not in self.observed:
@@ -517,8 +517,8 @@ class _Assembly:
             source = nets[0].source
             pairs = [("value", None)] if nets[0].domain is SIGNAL else list(nets[0].domain.across)
             for k, (variable, quantity) in enumerate(pairs):
-                givers = [self.plan.givers.get(net.name) for net in nets]
-                if any(g is None for g in givers):
+                givers = [g for net in nets if (g := self.plan.givers.get(net.name)) is not None]
+                if len(givers) < len(nets):
                     continue
                 expressions = functools.partial(self.across, givers, k)
                 shown = quantity if quantity is not None else self.plan.graph.quantity(givers[0])
@@ -596,6 +596,10 @@ class _Assembly:
             for k in layout.indices(f"q_{port.name}"):
                 total, size = total + column[k], size + ca.fabs(column[k]) / 2
         return total, size
+
+
+def _itself(column: ca.SX) -> ca.SX:
+    return column
 
 
 def _variable(name: str, quantity: Quantity, layout: Any, slot: str, column: Callable[[], ca.SX]) -> Variable:

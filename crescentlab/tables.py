@@ -17,6 +17,7 @@ from pydantic_core import CoreSchema, PydanticCustomError, core_schema
 
 from crescentlab import maths
 from crescentlab.errors import InputError, Place, UnitError
+from crescentlab.symbols import Sym
 from crescentlab.units import QUANTITIES, Quantity, normalise, parse_any
 
 MAX_POINTS = 2000
@@ -42,7 +43,7 @@ class Curve(BaseModel):
     def slope(self, x: Any) -> Any:
         """dy/dx, constant between knots (the right-hand slope at a knot)."""
         slopes = np.diff(self.y) / np.diff(self.x)
-        if not isinstance(x, maths.Sym):
+        if not isinstance(x, Sym):
             piece = np.clip(np.searchsorted(self.x, x, side="right") - 1, 0, len(slopes) - 1)
             return slopes[piece][()]
         result: Any = float(slopes[0])

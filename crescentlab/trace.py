@@ -14,6 +14,7 @@ from typing import Any
 
 import casadi as ca
 import numpy as np
+from pydantic import BaseModel
 
 from crescentlab.component import Component, check_returned, fluid_names, structural_fields
 from crescentlab.domain import HYDRAULIC, Held, Observable, State
@@ -119,7 +120,7 @@ class Trace:
     """Values inside the equations that depend on time alone."""
 
 
-def numeric_fields(model: type[Any], values: Any) -> tuple[str, ...]:
+def numeric_fields(model: type[BaseModel], values: Any) -> tuple[str, ...]:
     """Fields that stay symbolic: floats that are given and not structural."""
     structural = structural_fields(model)
     return tuple(n for n in model.model_fields if n not in structural and getattr(values, n) is not None)
@@ -127,7 +128,7 @@ def numeric_fields(model: type[Any], values: Any) -> tuple[str, ...]:
 
 def structure_of(model: Any) -> tuple[Any, ...]:
     """What of a component or fluid shapes its equations."""
-    cls = type(model)
+    cls: type[BaseModel] = type(model)
     structural = structural_fields(cls)
     return cls, tuple(
         (n, _hashable(value) if n in structural else None)
@@ -289,8 +290,8 @@ class _Tracing:
         by_need: dict[tuple[int, ...], list[int]] = {}
         for k, need in needs.items():
             by_need.setdefault(tuple(sorted(need)), []).append(k)
-        for need, members in by_need.items():
-            yield Group(tuple(members), need, function("port", ca.vertcat(*[y[k] for k in members])))
+        for inputs, members in by_need.items():
+            yield Group(tuple(members), inputs, function("port", ca.vertcat(*[y[k] for k in members])))
 
     def events(self, returned: dict[str, Any], function: Any) -> tuple[list[EventInfo], list[ca.SX], list[ca.SX]]:
         infos: list[EventInfo] = []

@@ -22,7 +22,8 @@ MAX_SETTLING = 200
 ZENO_COUNT = 60
 """This many firings of one event within ``ZENO_SPAN`` of the run are taken as endless."""
 ZENO_SPAN = 1e-6
-SCAN_POINTS = 20_001
+SCAN_CHUNKS, SCAN_POINTS = 40, 501
+"""A run is scanned for curved time roots in chunks of this many points."""
 
 
 class Hybrid:
@@ -56,7 +57,9 @@ class Hybrid:
         self.watched = np.flatnonzero(system.bits.on_state)
         self.curved = np.flatnonzero(system.bits.on_time & ~system.bits.linear)
         self.linear = np.flatnonzero(system.bits.linear)
-        self.curved_roots: list[tuple[float, int]] | None = None
+        self.curved_roots: list[float] = []
+        self.scanned: float | None = None
+        """Until when curved relations on time have been scanned; None: not yet."""
 
     def relation(self, t: float, x: np.ndarray, rate: np.ndarray | None = None) -> list[np.ndarray]:
         """Relations, their rates and magnitudes; ``rate`` is dx/dt where the caller knows it."""
@@ -75,7 +78,15 @@ class Hybrid:
 
     def truth(self, g: np.ndarray) -> np.ndarray:
         """Truth of each relation: above its boundary, or on it unless strict."""
-        return (g > 0) | ((g == 0) & ~self.bits_info.strict)
+        return np.asarray((g > 0) | ((g == 0) & ~self.bits_info.strict))
+
+    def sides(self, t: float, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Where each relation belongs: its truth, within its tolerance band the side it is heading for; and its rate."""
+        g, rate, scale = self.relation(t, x)
+        roundoff = 16 * EPS * scale
+        inside = np.abs(g) <= 2 * self.time_tolerance * np.abs(rate) + roundoff
+        moving = np.abs(rate) * self.span > roundoff
+        return np.where(inside & moving, rate > 0, self.truth(g)), rate
 
     def settle(self, t: float, x: np.ndarray) -> None:
         """Bring every bit to rest; raises :class:`SimulationError` naming relations that cannot."""
@@ -83,12 +94,7 @@ class Hybrid:
             return
         seen: dict[bytes, int] = {}
         for _ in range(MAX_SETTLING):
-            g, rate, scale = self.relation(t, x)
-            roundoff = 16 * EPS * scale
-            inside = np.abs(g) <= 2 * self.time_tolerance * np.abs(rate) + roundoff
-            moving = np.abs(rate) * self.span > roundoff
-            sides = np.where(inside & moving, rate > 0, self.truth(g))
-            new = sides.astype(float)
+            new = self.sides(t, x)[0].astype(float)
             if np.array_equal(new, self.b):
                 return
             key = new.tobytes()
@@ -99,6 +105,7 @@ class Hybrid:
                 )
             seen[key] = 1
             self.b = new
+            self.rescan()
         raise SimulationError("the relations do not settle")
 
     # -- stops -----------------------------------------------------------------------------------
@@ -122,8 +129,7 @@ class Hybrid:
             x, held = new_x.copy(), new_h.copy()
             if not np.array_equal(held, self.h):
                 self.h = held
-                if self.curved.size and self.bits_info.held_dependent[self.curved].any():
-                    self.curved_roots = None
+                self.rescan()
             self.settle(t, x)
             self.finished = self.finished or any(self.system.events[k].kind == "stop" for k in fired)
         raise SimulationError(f"events keep causing each other at one instant: {', '.join(dict.fromkeys(names[-6:]))}")
@@ -142,7 +148,7 @@ class Hybrid:
             event = self.system.events[k]
             if event.kind == "fail":
                 names = event.message_names
-                values = np.array(self.system.function_of(names)(t, x, self.h, self.b, self.p)).ravel() if names else []
+                values: np.ndarray | list[float] = np.array(self.system.function_of(names)(t, x, self.h, self.b, self.p)).ravel() if names else []
                 shown = {
                     n.rpartition(".")[2]: q.show(float(v), DISPLAY.get(q.name))
                     for n, v in zip(names, values, strict=True)
@@ -183,27 +189,41 @@ class Hybrid:
                 side = 1.0 if self.b[k] else -1.0
                 if side * rate[k] < 0 and (ahead := -g[k] / rate[k]) > 0:
                     soonest = min(soonest, t + ahead)
-        if self.curved.size:
-            if self.curved_roots is None:
-                self.curved_roots = self.scan(t, x)
-            for root, _ in self.curved_roots:
-                if root > t + self.time_tolerance:
-                    return min(soonest, root)
-        return float(soonest)
+        return min(float(soonest), self.next_curved_root(t, x))
 
-    def scan(self, t: float, x: np.ndarray) -> list[tuple[float, int]]:
-        """All roots ahead of relations that curve in time, found on a fine grid and then closed in on."""
-        times = np.linspace(t, self.end, SCAN_POINTS)
+    def rescan(self) -> None:
+        """Forget the roots of relations on time where they may have changed with held values and bits."""
+        if self.curved.size and self.bits_info.held_dependent[self.curved].any():
+            self.scanned = None
+
+    def next_curved_root(self, t: float, x: np.ndarray) -> float:
+        """Earliest root after ``t`` of the relations that curve in time, or infinity; scans as far as needed."""
+        if not self.curved.size:
+            return np.inf
+        if self.scanned is None:
+            self.curved_roots, self.scanned = [], t
+        while True:
+            while self.curved_roots and self.curved_roots[0] <= t + self.time_tolerance:
+                self.curved_roots.pop(0)
+            if self.curved_roots or self.scanned >= self.end:
+                return self.curved_roots[0] if self.curved_roots else np.inf
+            until = min(self.end, self.scanned + self.span / SCAN_CHUNKS)
+            self.curved_roots = self.scan(self.scanned, until, x)
+            self.scanned = until
+
+    def scan(self, start: float, end: float, x: np.ndarray) -> list[float]:
+        """Roots in [start, end] of relations that curve in time, found on a fine grid and then closed in on."""
+        times = np.linspace(start, end, SCAN_POINTS)
         prepared = self.system.relation
         columns = prepared.function(times.reshape(1, -1), x, self.h, self.b, np.zeros(x.size), prepared.parameters(self.p))
         g, rate = np.array(columns[0])[self.curved], np.array(columns[1])[self.curved]
-        found: list[tuple[float, int]] = []
+        found: list[float] = []
         for row, k in enumerate(self.curved):
             for j in np.flatnonzero(np.sign(g[row, 1:]) != np.sign(g[row, :-1])):
-                found.append((self.close_in(k, times[j], times[j + 1], x), int(k)))
+                found.append(self.close_in(k, float(times[j]), float(times[j + 1]), x))
             dips = (g[row, 1:] * g[row, :-1] > 0) & (rate[row, :-1] * g[row, :-1] < 0) & (rate[row, 1:] * g[row, 1:] > 0)
             for j in np.flatnonzero(dips):
-                found += [(root, int(k)) for root in self.dip(k, times[j], times[j + 1], x)]
+                found += self.dip(k, float(times[j]), float(times[j + 1]), x)
         return sorted(found)
 
     def at(self, k: int, t: float, x: np.ndarray) -> tuple[float, float]:

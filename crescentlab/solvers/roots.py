@@ -87,32 +87,53 @@ class RootFinder:
 
         times = np.concatenate(([low], low + _S * (high - low), [high]))
         values = np.array([value(t) for t in times])
-        wrong = values < 0
-        if not wrong.any():
-            return self.shallow(value, times, values)
-        right = np.flatnonzero(~wrong)
-        first_right = int(right[0]) if right.size else None
-        if first_right is None:
-            return low  # on the wrong side all along: it turns at once
-        later = np.flatnonzero(wrong & (np.arange(times.size) > first_right))
-        if not later.size:
-            return None  # it came back to its side and stays there
-        j = int(later[0])
-        return self.close(value, float(times[j - 1]), float(times[j]))
+        wrong = np.flatnonzero(values[1:] < 0)  # at low its bit has been settled
+        if wrong.size:
+            return self.close(place, side, path, value, times[wrong[0]], times[wrong[0] + 1], low)
+        return self.shallow(place, side, path, value, times, values)
 
-    def shallow(self, value: Callable[[float], float], times: np.ndarray, values: np.ndarray) -> float | None:
-        """A dip between samples: look closer around the smallest sample."""
+    def shallow(
+        self, place: int, side: float, path: Interpolant, value: Callable[[float], float], times: np.ndarray, values: np.ndarray
+    ) -> float | None:
+        """A dip between samples: go to its bottom."""
         j = int(np.argmin(values))
-        fine = np.linspace(times[max(j - 1, 0)], times[min(j + 1, times.size - 1)], 33)
-        inner = np.array([value(t) for t in fine])
-        crossed = np.flatnonzero(inner < 0)
-        return self.close(value, float(fine[crossed[0] - 1]), float(fine[crossed[0]])) if crossed.size and crossed[0] > 0 else None
+        low, high = float(times[max(j - 1, 0)]), float(times[min(j + 1, times.size - 1)])
 
-    def close(self, value: Callable[[float], float], low: float, high: float) -> float:
-        tolerance = self.hybrid.time_tolerance
-        if high - low <= tolerance:
-            return high
-        root = float(brentq(value, low, high, xtol=tolerance, rtol=4 * EPS))
-        while root < high and value(root) >= 0:
-            root = min(high, root + tolerance)
+        def slope(t: float) -> float:
+            return float(side * self.hybrid.relation(t, path(t))[1][place])
+
+        if not slope(low) < 0 < slope(high):
+            return None
+        bottom = float(brentq(slope, low, high, xtol=self.hybrid.time_tolerance, rtol=4 * EPS))
+        return self.close(place, side, path, value, low, bottom, float(times[0])) if value(bottom) < 0 else None
+
+    def close(
+        self, place: int, side: float, path: Interpolant, value: Callable[[float], float], low: float, high: float, start: float
+    ) -> float | None:
+        """The root between ``low``, where the relation is on its side or just leaving it, and ``high``, where it is not.
+
+        Wrong from the very start of the step is a swing too small for the solver's tolerance: then it turns once it
+        is also heading that way (a ball lands falling, not rising).
+        """
+        tolerance, end = self.hybrid.time_tolerance, high
+        at_low = value(low)
+        while at_low <= 0 and high - low > tolerance:  # brentq needs a sign, and would stop at an exact zero
+            middle = (low + high) / 2
+            at_middle = value(middle)
+            if at_middle < 0:
+                high = middle
+            else:
+                low, at_low = middle, at_middle
+        root = high if high - low <= tolerance else float(brentq(value, low, high, xtol=tolerance, rtol=4 * EPS))
+        from_start = root - start <= 2 * tolerance
+        nudge = tolerance
+        while not self.turned(place, side, root, path, heading=from_start):
+            if root >= end:
+                return None
+            root, nudge = min(end, root + nudge), 2 * nudge
         return root
+
+    def turned(self, place: int, side: float, t: float, path: Interpolant, *, heading: bool) -> bool:
+        """Whether settling at ``t`` would turn the relation; with ``heading``, only if it moves that way."""
+        sides, rate = self.hybrid.sides(t, path(t))
+        return bool(sides[place] != (side > 0)) and not (heading and side * rate[place] > 0)

@@ -80,7 +80,7 @@ class Stepper:
             self.options["jac"] = {"sparse": self.sparse, "dense": self.dense, "banded": self.banded}[layout]
         if layout != "sparse" and functions.n:
             pattern = functions.pattern
-            self.rows = pattern.indices
+            self.rows = np.asarray(pattern.indices)
             self.columns = np.repeat(np.arange(functions.n), np.diff(pattern.indptr))
         else:
             self.structure = functions.pattern
@@ -206,7 +206,7 @@ class _Nordsieck:
         rows = self.history.reshape(-1, self.n)
         powers = ((times - self.t) / self.h)[:, None] ** np.arange(len(rows))
         powers[:, -1] *= self.scale  # the last row is scaled for the next step where the order falls
-        states = powers @ rows
+        states: np.ndarray = powers @ rows
         return states if self.back is None else states[:, self.back]
 
 
