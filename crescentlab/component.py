@@ -131,7 +131,7 @@ class Component(BaseModel):
 
 
 @functools.cache
-def _declared(cls: type[Component], kind: type[Declared]) -> tuple[Any, ...]:
+def _declared(cls: type[Component], kind: Any) -> tuple[Any, ...]:
     found: dict[str, Any] = {}
     for base in reversed(cls.__mro__):
         for name, value in vars(base).items():

@@ -146,7 +146,7 @@ _PLAIN = {"sin": maths.sin, "cos": maths.cos, "tan": maths.tan, "asin": maths.as
           "exp": maths.exp, "log": maths.log, "tanh": maths.tanh, "sinh": maths.sinh, "cosh": maths.cosh}  # fmt: skip
 _WHOLE: dict[str, Callable[[float], float]] = {"floor": math.floor, "ceil": math.ceil, "round": lambda x: round(x)}
 _SAME = {"min": maths.minimum, "max": maths.maximum}
-_REDUCE = {"sum": maths.total, "mean": lambda v: maths.total(v) / len(v)}
+_REDUCE: dict[str, Callable[[Any], Any]] = {"sum": maths.total, "mean": lambda v: maths.total(v) / len(v)}
 FUNCTIONS = sorted([*_PLAIN, *_WHOLE, *_SAME, *_REDUCE, "abs", "sqrt", "where", "involute", "atan2"])
 _COMPARE: dict[type[ast.cmpop], Callable[[Any, Any], Any]] = {ast.Lt: operator.lt, ast.LtE: operator.le, ast.Gt: operator.gt, ast.GtE: operator.ge}
 

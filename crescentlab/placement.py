@@ -88,7 +88,7 @@ def _apart(at: np.ndarray, size: np.ndarray) -> np.ndarray:
     at = at.copy()
     need = (size[:, None, :] + size[None, :, :]) / 2 + GAP
     apart = np.arange(len(at))[:, None] != np.arange(len(at))[None, :]
-    for _ in range(400):
+    for _ in range(400 if len(at) <= LARGE else 60):
         gap = at[:, None, :] - at[None, :, :]
         over = need - np.abs(gap)
         clash = (over > 1e-6).all(axis=2) & apart

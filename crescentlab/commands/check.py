@@ -91,7 +91,7 @@ def told(plan: Plan, found: dict[str, Any]) -> str:
     kinds = Counter(e["kind"] for e in found["events"])
     words = {"when": "event", "every": "tick", "fail": "limit", "stop": "stop condition"}
     events = [counted(kinds[kind], word) for kind, word in words.items() if kinds[kind]] or ["no events"]
-    fluids = ", ".join(sorted(set(found["fluids"].values()))) or "named by the circuit around it"
+    fluids = ", ".join(sorted(set(found["fluids"].values()))) or ("named by the circuit around it" if plan.design.netlist.sections.ports else "none")
     lines = [
         found["title"],
         "",
@@ -108,7 +108,7 @@ def told(plan: Plan, found: dict[str, Any]) -> str:
 
 def _components(types: dict[str, str]) -> str:
     counts = Counter(types.values())
-    return f"{len(types)}: " + ", ".join(_times(name, n) for name, n in sorted(counts.items()))
+    return f"{len(types)}: {', '.join(_times(name, n) for name, n in sorted(counts.items()))}" if types else "0"
 
 
 def _times(name: str, n: int) -> str:

@@ -81,7 +81,7 @@ class Hybrid:
         return np.asarray((g > 0) | ((g == 0) & ~self.bits_info.strict))
 
     def sides(self, t: float, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Where each relation belongs: its truth, within its tolerance band the side it is heading for; and its rate."""
+        """Where each relation belongs (its truth; within its band, the side it is heading for), and its rate."""
         g, rate, scale = self.relation(t, x)
         roundoff = 16 * EPS * scale
         inside = np.abs(g) <= 2 * self.time_tolerance * np.abs(rate) + roundoff

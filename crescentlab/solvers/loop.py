@@ -286,7 +286,7 @@ class _Run:
     # -- checks ----------------------------------------------------------------------------------
 
     def check_step(self, low: float, high: float, x: np.ndarray) -> None:
-        if not math.isfinite(x.sum()):
+        if not math.isfinite(x @ x):
             self.check_finite(high, x, x, "")
         if high - low < SMALLEST_STEP * self.span:
             self.tiny += 1
@@ -350,7 +350,7 @@ class _PressureLimits:
         return warning
 
     def look(self, t: float, vector: np.ndarray, places: np.ndarray, floors: np.ndarray, names: list[str], tension: list[bool]) -> str | None:
-        if not (vector < floors).any():
+        if not np.count_nonzero(vector < floors):
             return None
         k = int(np.flatnonzero(vector[places] < floors[places])[0])
         said = (

@@ -55,12 +55,12 @@ class RootFinder:
         after, slope, band = self.read(high, x_high, rate_high)
         suspects = after < -band
         turning = (self.slope < 0) & (slope > 0)
-        if turning.any():
+        if np.count_nonzero(turning):
             turning = self.dips(turning & (self.before > band) & ~suspects, after, slope, high - low)
-        if suspects.any() or turning.any():
+        if np.count_nonzero(suspects) or np.count_nonzero(turning):
             path = interpolant()
             places = np.flatnonzero(suspects | turning)
-            found = [r for k in places if (r := self.locate(int(k), low, high, self.side[k], path)) is not None]
+            found = [r for k in places if (r := self.course(int(k), path).first_root(low, high)) is not None]
             if found:
                 return min(found)
         self.before, self.slope = after, slope
@@ -76,64 +76,71 @@ class RootFinder:
             result[k] = cubic.min(axis=1) <= 0.02 * (self.before[k] + np.abs(after[k]))
         return result
 
-    def locate(self, k: int, low: float, high: float, side: float, path: Interpolant) -> float | None:
-        """The first time relation k is on the other side, as closely as the clock allows."""
-        place = self.watched[k]
-        zeros = np.zeros(self.hybrid.system.x.numel())
+    def course(self, k: int, path: Interpolant) -> _Course:
+        """The k-th watched relation along ``path``."""
+        return _Course(self.hybrid, int(self.watched[k]), float(self.side[k]), path)
 
-        def value(t: float) -> float:
-            g, _, scale = self.hybrid.relation(t, path(t), zeros)
-            return float(side * g[place] + 16 * EPS * scale[place])
 
+class _Course:
+    """One relation along the interpolant of a step: its distance from turning, negative once it should."""
+
+    def __init__(self, hybrid: Hybrid, place: int, side: float, path: Interpolant) -> None:
+        self.hybrid, self.place, self.side, self.path = hybrid, place, side, path
+        self.tolerance = hybrid.time_tolerance
+        self.nothing = np.zeros(hybrid.system.x.numel())
+
+    def value(self, t: float) -> float:
+        """The distance, plus roundoff."""
+        g, _, scale = self.hybrid.relation(t, self.path(t), self.nothing)
+        return float(self.side * g[self.place] + 16 * EPS * scale[self.place])
+
+    def slope(self, t: float) -> float:
+        """Its rate."""
+        return float(self.side * self.hybrid.relation(t, self.path(t))[1][self.place])
+
+    def turned(self, t: float, *, heading: bool) -> bool:
+        """Whether settling at ``t`` would turn the relation; with ``heading``, only if it moves that way."""
+        sides, rate = self.hybrid.sides(t, self.path(t))
+        return bool(sides[self.place] != (self.side > 0)) and not (heading and self.side * rate[self.place] > 0)
+
+    def first_root(self, low: float, high: float) -> float | None:
+        """When it first turns in (low, high], as closely as the clock allows; at ``low`` it has been settled."""
         times = np.concatenate(([low], low + _S * (high - low), [high]))
-        values = np.array([value(t) for t in times])
-        wrong = np.flatnonzero(values[1:] < 0)  # at low its bit has been settled
+        values = np.array([self.value(t) for t in times])
+        wrong = np.flatnonzero(values[1:] < 0)
         if wrong.size:
-            return self.close(place, side, path, value, times[wrong[0]], times[wrong[0] + 1], low)
-        return self.shallow(place, side, path, value, times, values)
-
-    def shallow(
-        self, place: int, side: float, path: Interpolant, value: Callable[[float], float], times: np.ndarray, values: np.ndarray
-    ) -> float | None:
-        """A dip between samples: go to its bottom."""
+            j = int(wrong[0])
+            return self.close(float(times[j]), float(times[j + 1]), low, high)
         j = int(np.argmin(values))
-        low, high = float(times[max(j - 1, 0)]), float(times[min(j + 1, times.size - 1)])
-
-        def slope(t: float) -> float:
-            return float(side * self.hybrid.relation(t, path(t))[1][place])
-
-        if not slope(low) < 0 < slope(high):
+        before, after = float(times[max(j - 1, 0)]), float(times[min(j + 1, times.size - 1)])
+        if not self.slope(before) < 0 < self.slope(after):
             return None
-        bottom = float(brentq(slope, low, high, xtol=self.hybrid.time_tolerance, rtol=4 * EPS))
-        return self.close(place, side, path, value, low, bottom, float(times[0])) if value(bottom) < 0 else None
+        bottom = float(brentq(self.slope, before, after, xtol=self.tolerance, rtol=4 * EPS))
+        return self.close(before, bottom, low, high) if self.value(bottom) < 0 else None
 
-    def close(
-        self, place: int, side: float, path: Interpolant, value: Callable[[float], float], low: float, high: float, start: float
-    ) -> float | None:
-        """The root between ``low``, where the relation is on its side or just leaving it, and ``high``, where it is not.
+    def close(self, low: float, high: float, start: float, end: float) -> float | None:
+        """The root between ``low``, where it is on its side or just leaving it, and ``high``, where it is not.
 
-        Wrong from the very start of the step is a swing too small for the solver's tolerance: then it turns once it
-        is also heading that way (a ball lands falling, not rising).
+        Where the interpolant crosses although the equations head back, or is on the wrong side from the very start
+        of the step, the swing was too small for the solver: then it turns once it is also heading that way (a ball
+        lands falling, not rising).
         """
-        tolerance, end = self.hybrid.time_tolerance, high
-        at_low = value(low)
-        while at_low <= 0 and high - low > tolerance:  # brentq needs a sign, and would stop at an exact zero
+        at_low = self.value(low)
+        while at_low <= 0 and high - low > self.tolerance:  # brentq wants two signs, and would stop at a zero
             middle = (low + high) / 2
-            at_middle = value(middle)
+            at_middle = self.value(middle)
             if at_middle < 0:
                 high = middle
             else:
                 low, at_low = middle, at_middle
-        root = high if high - low <= tolerance else float(brentq(value, low, high, xtol=tolerance, rtol=4 * EPS))
-        from_start = root - start <= 2 * tolerance
-        nudge = tolerance
-        while not self.turned(place, side, root, path, heading=from_start):
-            if root >= end:
-                return None
+        root = high
+        if high - low > self.tolerance:
+            root = float(brentq(self.value, low, high, xtol=self.tolerance, rtol=4 * EPS))
+        nudge = self.tolerance
+        if self.turned(root, heading=root - start <= 2 * nudge):
+            return root
+        while root < end:
             root, nudge = min(end, root + nudge), 2 * nudge
-        return root
-
-    def turned(self, place: int, side: float, t: float, path: Interpolant, *, heading: bool) -> bool:
-        """Whether settling at ``t`` would turn the relation; with ``heading``, only if it moves that way."""
-        sides, rate = self.hybrid.sides(t, path(t))
-        return bool(sides[place] != (side > 0)) and not (heading and side * rate[place] > 0)
+            if self.turned(root, heading=True):
+                return root
+        return None

@@ -80,7 +80,7 @@ class Stepper:
             self.options["jac"] = {"sparse": self.sparse, "dense": self.dense, "banded": self.banded}[layout]
         if layout != "sparse" and functions.n:
             pattern = functions.pattern
-            self.rows = np.asarray(pattern.indices)
+            self.rows: np.ndarray = np.asarray(pattern.indices)
             self.columns = np.repeat(np.arange(functions.n), np.diff(pattern.indptr))
         else:
             self.structure = functions.pattern
