@@ -120,6 +120,10 @@ def spectrum(p: np.ndarray) -> np.ndarray:
 # --- the paper's geometry, written out again ------------------------------------------------------------------------
 
 
+TRAPPED_FOR = 6.4564755 * DEG
+"""nu_02 - nu_01 of 13 and 16 teeth, for which the trapped volume exists (6.46 deg): Eqs. 7, 8, 10, 11."""
+
+
 def rates(nu_d: np.ndarray | float, z_1: int = 13, z_2: int = 16) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """dV_d, dV_s, dV_t over the shaft's angle [m^3/rad] by Eqs. 3 to 16, base radii for rho_1 and rho_2."""
     m, theta_0, e, H = 4 * MM, 32 * DEG, 6 * MM, 13 * MM
@@ -200,10 +204,9 @@ def test_figure_18_jumps(turn):
     twice = np.flatnonzero(np.diff(time) == 0)
     starts = [k for k in twice if exists[k + 1] > exists[k]]
     ends = [k for k in twice if exists[k + 1] < exists[k]]
-    pitch, eps = 2 * math.pi / 13, 1e-9
-    delivery = rates(0.0)[0] - rates(pitch - eps)[0]
-    end = 6.4606 * DEG
-    suction = rates(end + 1e-3 * DEG)[1] - rates(end - 1e-3 * DEG)[1]
+    eps = 1e-6 * DEG
+    delivery = rates(0.0)[0] - rates(2 * math.pi / 13 - eps)[0]
+    suction = rates(TRAPPED_FOR + eps)[1] - rates(TRAPPED_FOR - eps)[1]
     assert len(ends) == 13
     assert len(starts) >= 12
     for k in starts:
@@ -229,8 +232,7 @@ def test_figure_18_period(turn):
 def test_figure_18_curves(turn):
     """Fig. 18: the running circuit follows Eqs. 3 to 16 at the angle of its shaft; 1e-6 away from the jumps."""
     nu_d = np.mod(turn.last("shaft.phi"), 2 * math.pi / 13)
-    end = 6.4606 * DEG
-    away = (nu_d > 1e-5) & (nu_d < 2 * math.pi / 13 - 1e-5) & (np.abs(nu_d - end) > 1e-4)
+    away = (nu_d > 1e-5) & (nu_d < 2 * math.pi / 13 - 1e-5) & (np.abs(nu_d - TRAPPED_FOR) > 1e-5)
     for name, expected in zip(("dVd", "dVs", "dVt"), rates(nu_d), strict=True):
         size = np.abs(expected).max()
         assert turn.last(f"gears.{name}")[away] == pytest.approx(expected[away], abs=1e-6 * size)
@@ -422,11 +424,11 @@ def source_flow(rpm: int, run: Settled) -> np.ndarray:
 
 @pytest.mark.parametrize(("rpm", "bar"), POINTS)
 def test_size_of_the_ripple(rpm, bar):
-    """First harmonic against a line of impedances: delivery volume, duct, 70 cm^3, pipe, throttle; within 10 %.
+    """First harmonic against a line of impedances: delivery volume and cover, duct, 70 cm^3, pipe, throttle; 10 %.
 
-    Small oscillations about the mean: capacities V/beta, the duct one pi-section with an inertia, the pipe a lossless
-    line of wave speed sqrt(beta/rho), the throttle 2 p/q. Left out: the cover's compliance (1 %), friction, and
-    that the bulk modulus follows the pressure.
+    Small oscillations about the mean: capacities V/beta, the cover's 600 mm^2 * 16 um/3 bar, the duct a pi-section of
+    inertia and its loss 2 dp/q, the pipe a lossless line of wave speed sqrt(beta/rho), the throttle 2 p/q. Left out:
+    friction in the pipe, and that the bulk modulus follows the pressure.
     """
     run = at_pressure(rpm, bar)
     p, q, omega = run.mean("delivery.p"), run.mean("throttle.q"), 2 * math.pi * 13 * rpm / 60
@@ -442,11 +444,12 @@ def test_size_of_the_ripple(rpm, bar):
     admittance += s * 70 * CC / beta  # filter seat
     duct = math.pi / 4 * (11 * MM) ** 2
     half = s * duct * 130 * MM / 2 / beta
-    inertia = s * RHO * 130 * MM / duct
-    admittance = half + 1 / (inertia + 1 / (admittance + half)) + s * 13.8 * CC / beta
+    series = s * RHO * 130 * MM / duct + 2 * (p - run.mean("line.filter.p")) / q
+    admittance = half + 1 / (series + 1 / (admittance + half)) + s * (13.8 * CC / beta + 600e-6 * 16e-6 / 3e5)
     flow = np.fft.rfft(source_flow(rpm, run))[13] * 2 / (13 * 400)
     expected = abs(flow / admittance)
     found = spectrum(ripple(rpm, bar)[0])[4 * 13]
+    print('RIPPLE',rpm,bar,expected,found,abs(flow)/LPM)
     assert found == pytest.approx(expected, rel=0.10)
 
 
@@ -625,7 +628,7 @@ def test_peak_in_the_trapped_volume_is_that_of_its_gap(rpm):
     An incompressible oil would need rho/2 (dV_t omega/(0.7 h_a2 b_1))^2 above p'; compression can only lower that.
     """
     run = at_pressure(2000, 5.0) if rpm == 2000 else at_pressure(4000, 6.0)
-    squeezed = float(np.abs(rates(np.linspace(0, 6.46 * DEG, 500))[2]).max()) * rpm * math.pi / 30
+    squeezed = float(np.abs(rates(np.linspace(0, 0.999 * TRAPPED_FOR, 500))[2]).max()) * rpm * math.pi / 30
     limit = RHO / 2 * (squeezed / (0.7 * 76.5e-6 * 2.391e-3)) ** 2 + run.last("annular.p").max()
     peak = run.last("trapped.p").max()
     assert 0.5 * limit < peak < 1.02 * limit

@@ -220,10 +220,10 @@ class Hybrid:
         found: list[float] = []
         for row, k in enumerate(self.curved):
             for j in np.flatnonzero(np.sign(g[row, 1:]) != np.sign(g[row, :-1])):
-                found.append(self.close_in(k, float(times[j]), float(times[j + 1]), x))
+                found.append(self.close_in(int(k), float(times[j]), float(times[j + 1]), x))
             dips = (g[row, 1:] * g[row, :-1] > 0) & (rate[row, :-1] * g[row, :-1] < 0) & (rate[row, 1:] * g[row, 1:] > 0)
             for j in np.flatnonzero(dips):
-                found += self.dip(k, float(times[j]), float(times[j + 1]), x)
+                found += self.dip(int(k), float(times[j]), float(times[j + 1]), x)
         return sorted(found)
 
     def at(self, k: int, t: float, x: np.ndarray) -> tuple[float, float]:
