@@ -17,11 +17,14 @@ from scipy.sparse.csgraph import reverse_cuthill_mckee
 from crescentlab.errors import SimulationError
 from crescentlab.system import Evaluator, System, Values
 
-DENSE_LIMIT = 80
-"""Up to this many states LSODA with a full matrix is used by ``auto``."""
-BAND_SHARE = 0.25
-"""A reordered matrix whose band is narrower than this share of n is integrated as banded."""
-BAND_LIMIT = 120
+SMALL = 25
+"""Up to this many states LSODA with a full matrix is quickest (benchmarks/thresholds.py)."""
+BAND_SHARE = 0.5
+"""A reordered matrix whose band is at most this share of n, and ...."""
+BAND_LIMIT = 100
+"""... at most this wide, is integrated as banded."""
+WIDE = 120
+"""Beyond this many states of wide band, BDF with the sparse Jacobian overtakes LSODA with a full matrix."""
 
 METHODS: dict[str, Any] = {
     "bdf": integrate.BDF, "radau": integrate.Radau, "rk45": integrate.RK45, "dop853": integrate.DOP853, "lsoda": integrate.LSODA,
@@ -251,14 +254,14 @@ def choose(name: str, functions: Functions) -> tuple[str, str]:
     if name in ("rk45", "dop853"):
         return name, "dense"
     if name in ("bdf", "radau"):
-        return name, "sparse" if n > DENSE_LIMIT else "dense"
-    if n <= DENSE_LIMIT:
+        return name, "sparse" if n > WIDE else "dense"
+    if n <= SMALL:
         return "lsoda", "dense"
     _, lower, upper = banded(functions.pattern)
     width = lower + upper + 1
     if width <= BAND_SHARE * n and width <= BAND_LIMIT:
         return "lsoda", "banded"
-    return ("bdf", "sparse") if name == "auto" else ("lsoda", "dense")
+    return ("bdf", "sparse") if name == "auto" and n > WIDE else ("lsoda", "dense")
 
 
 def stepper(name: str, functions: Functions, rtol: float, atol: np.ndarray) -> Stepper:
