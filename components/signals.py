@@ -194,7 +194,7 @@ class Pulse(_Inferring, Component):
 class TimeTable(Component):
     r"""Signal tabulated over time, piecewise linear, continued with the end slopes.
 
-    .. math:: y = y_k + (y_{k+1} - y_k) rac{t - t_k}{t_{k+1} - t_k}
+    .. math:: y = y_k + (y_{k+1} - y_k) \frac{t - t_k}{t_{k+1} - t_k}
 
     t [s]; y in the SI unit of the table's second column. Each knot is an exact stop. Not for jumps: use `step`.
     Source: linear interpolation.
@@ -216,9 +216,9 @@ class TimeTable(Component):
 class Table(Component):
     r"""Tabulated function of a signal, piecewise linear, continued with the end slopes.
 
-    .. math:: y = y_k + (y_{k+1} - y_k) rac{u - u_k}{u_{k+1} - u_k}
+    .. math:: y = y_k + (y_{k+1} - y_k) \frac{u - u_k}{u_{k+1} - u_k}
 
-    u and y in the SI units of the table's first and second column. Each knot is an event. Not for functions of
+    u [any], y [any], in the SI units of the table's first and second column. Each knot is an event. Not for functions of
     time: use `time_table`. Source: linear interpolation.
     """
 

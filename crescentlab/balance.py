@@ -28,7 +28,11 @@ class Balance:
 
     def as_json(self) -> dict[str, object]:
         """Plain data for ``--json``."""
-        return {"circuit": self.circuit, "components": self.components, "merged": {k: v for k, v in self.merged.items() if v}}
+        return {
+            "circuit": self.circuit,
+            "components": self.components,
+            "merged": {k: v for k, v in self.merged.items() if v},
+        }
 
 
 def balance(system: System, values: Values, trajectory: Trajectory) -> Balance | None:
@@ -39,7 +43,9 @@ def balance(system: System, values: Values, trajectory: Trajectory) -> Balance |
         return None
     stored = ca.Function("S", system.arguments, [ca.vertcat(*[c for c, _, _ in contents.values()])])
     flows = ca.Function(
-        "Q", system.arguments, [ca.vertcat(*[q for _, q, _ in contents.values()]), ca.vertcat(*[m for _, _, m in contents.values()])]
+        "Q",
+        system.arguments,
+        [ca.vertcat(*[q for _, q, _ in contents.values()]), ca.vertcat(*[m for _, _, m in contents.values()])],
     )
     low, high = np.array(pieces.low), np.array(pieces.high)
     into = np.zeros((len(contents), low.size))
@@ -64,4 +70,3 @@ def balance(system: System, values: Values, trajectory: Trajectory) -> Balance |
         {n: float(abs(e) / largest) for n, e in zip(names, error, strict=True)}, float(abs(error.sum()) / largest),
         {n: float(v) for n, v in zip(names, np.abs(moved).sum(axis=1), strict=True)},
     )  # fmt: skip
-

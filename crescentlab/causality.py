@@ -91,7 +91,9 @@ def _forms(graph: Graph, allow_open: bool) -> dict[str, Component]:
     fixed = {net.name: any(m.port.role == "gives" for m in net.members) for net in graph.nets}
     gives = _match(ends, fixed)
     for name in flexible:
-        wanted = {port.name: _wanted(name, port, gives) for port in type(components[name]).ports() if port.role == "undecided"}
+        wanted = {
+            port.name: _wanted(name, port, gives) for port in type(components[name]).ports() if port.role == "undecided"
+        }
         components[name] = _form(graph.design.instances[name], wanted)
     return components
 
@@ -118,7 +120,8 @@ def _form(instance: Instance, wanted: dict[str, str]) -> Component:
             return form.model_construct(**{n: getattr(instance.component, n) for n in family.model_fields})
     said = ", ".join(f"{name} {role} its pressure" for name, role in wanted.items())
     raise CausalityError(
-        f"{instance.name}: no form of {family.type_name()} fits (here {said}); insert a capacity at one of its ends", instance.place
+        f"{instance.name}: no form of {family.type_name()} fits (here {said}); insert a capacity at one of its ends",
+        instance.place,
     )
 
 
@@ -129,15 +132,25 @@ def _giver(graph: Graph, net: Net, components: dict[str, Component], allow_open:
     givers = [m for m in net.members if _role(components, m) == "gives"]
     if len(givers) == 1:
         return givers[0]
-    word = {"hydraulic": "pressure", "translational": "motion", "rotational": "rotation"}.get(net.domain.name, net.domain.name)
+    word = {"hydraulic": "pressure", "translational": "motion", "rotational": "rotation"}.get(
+        net.domain.name, net.domain.name
+    )
     if len(givers) > 1:
         names = " and ".join(str(m) for m in givers)
-        advice = "insert a restriction between them, for example {type: orifice, area: 10 mm^2}" if net.domain is HYDRAULIC else "keep one of them"
+        advice = (
+            "insert a restriction between them, for example {type: orifice, area: 10 mm^2}"
+            if net.domain is HYDRAULIC
+            else "keep one of them"
+        )
         raise CausalityError(f"net {net.name}: {names} both give the {word}; {advice}", net.source.place)
     if allow_open and net.source.open:
         return None
     names = " and ".join(str(m) for m in net.members)
-    meet = f"{names} meet without a volume: insert" if net.domain is HYDRAULIC else f"nothing gives the {word} of {names}: insert"
+    meet = (
+        f"{names} meet without a volume: insert"
+        if net.domain is HYDRAULIC
+        else f"nothing gives the {word} of {names}: insert"
+    )
     raise CausalityError(f"net {net.name}: {meet} {net.domain.giver}", net.source.place)
 
 
@@ -156,15 +169,24 @@ def _fluids(graph: Graph, components: dict[str, Component], library: Library) ->
     for name, component in components.items():
         chosen: list[str] = []
         for argument in fluids_asked(type(component)):
-            found = [of_net[n] for p in fluid_ports(type(component), argument) for n in nets_of.get((name, p), []) if n in of_net]
+            found = [
+                of_net[n]
+                for p in fluid_ports(type(component), argument)
+                for n in nets_of.get((name, p), [])
+                if n in of_net
+            ]
             if not found and len(design.fluids) == 1:
                 found = list(design.fluids)
             if not found:
                 if not design.fluids:
                     raise InputError(
-                        "the circuit names no fluid; write for example fluid: {type: simple_oil, density: 860 kg/m^3}", design.instances[name].place
+                        "the circuit names no fluid; write for example fluid: {type: simple_oil, density: 860 kg/m^3}",
+                        design.instances[name].place,
                     )
-                raise InputError(f"{name}: its nets name no fluid; give one of them a fluid, for example {{fluid: {next(iter(design.fluids))}, ports: [...]}}", design.instances[name].place)
+                raise InputError(
+                    f"{name}: its nets name no fluid; give one of them a fluid, for example {{fluid: {next(iter(design.fluids))}, ports: [...]}}",
+                    design.instances[name].place,
+                )
             chosen.append(found[0])
         result[name] = tuple(chosen)
     return result
@@ -177,14 +199,23 @@ def _fluid_of_nets(graph: Graph, components: dict[str, Component]) -> dict[str, 
         only = next(iter(fluids))
         for net in hydraulic:
             if net.source.fluid not in (None, only):
-                raise InputError(f"net {net.name}: unknown fluid {net.source.fluid!r}: {nearest(str(net.source.fluid), fluids)}", net.source.place)
+                raise InputError(
+                    f"net {net.name}: unknown fluid {net.source.fluid!r}: {nearest(str(net.source.fluid), fluids)}",
+                    net.source.place,
+                )
         return {net.name: only for net in hydraulic}
     together: dict[tuple[str, str], list[Net]] = {}
     for net in hydraulic:
         for member in net.members:
             cls = type(components[member.instance])
             asked = fluids_asked(cls)
-            scope = member.port.name if f"fluid_{member.port.name}" in asked else "fluid" if asked else f"none {member.port.name}"
+            scope = (
+                member.port.name
+                if f"fluid_{member.port.name}" in asked
+                else "fluid"
+                if asked
+                else f"none {member.port.name}"
+            )
             together.setdefault((member.instance, scope), []).append(net)
     reach: dict[str, list[tuple[str, str]]] = {}
     for key, nets in together.items():
@@ -195,7 +226,10 @@ def _fluid_of_nets(graph: Graph, components: dict[str, Component]) -> dict[str, 
         if net.source.fluid is None:
             continue
         if net.source.fluid not in fluids:
-            raise InputError(f"net {net.name}: unknown fluid {net.source.fluid!r}: {nearest(str(net.source.fluid), fluids)}", net.source.place)
+            raise InputError(
+                f"net {net.name}: unknown fluid {net.source.fluid!r}: {nearest(str(net.source.fluid), fluids)}",
+                net.source.place,
+            )
         queue = deque([net])
         while queue:
             here = queue.popleft()
@@ -218,7 +252,9 @@ def _traces(design: Design, components: dict[str, Component], fluids: dict[str, 
     cache: dict[Any, Trace] = {}
     result: dict[str, Trace] = {}
     for name, component in components.items():
-        mine: dict[str, Fluid] = {arg: design.fluids[f] for arg, f in zip(fluids_asked(type(component)), fluids[name], strict=True)}
+        mine: dict[str, Fluid] = {
+            arg: design.fluids[f] for arg, f in zip(fluids_asked(type(component)), fluids[name], strict=True)
+        }
         key = (structure_of(component), tuple(structure_of(f) for f in mine.values()))
         if key not in cache:
             try:
@@ -251,12 +287,17 @@ def _sources(
             for (name, _), k in zip(port.inputs(), range(9), strict=False):
                 if member is giver:
                     sign = 1.0 if net.domain is CHAMBER else -1.0
-                    outputs = tuple(output(m, type(components[m.instance]).port_named(m.port.name).outputs()[k][0]) for m in takers)
+                    outputs = tuple(
+                        output(m, type(components[m.instance]).port_named(m.port.name).outputs()[k][0]) for m in takers
+                    )
                     source = Source(outputs, sign)
                 elif giver is None:
                     source = nothing
                 else:
-                    source = Source((output(giver, type(components[giver.instance]).port_named(giver.port.name).outputs()[k][0]),), 1.0)
+                    source = Source(
+                        (output(giver, type(components[giver.instance]).port_named(giver.port.name).outputs()[k][0]),),
+                        1.0,
+                    )
                 found[member.instance][layout.offsets[name][0] + member.element] = source
     return {name: tuple(sources) for name, sources in found.items()}
 
@@ -303,6 +344,10 @@ def _loop(graph: Graph, traces: dict[str, Trace], after: dict[Step, set[Step]]) 
     place = graph.design.instances[cycle[0].instance].place
     domains = {m.port.domain for net in graph.nets for m in net.members if m.instance in {s.instance for s in cycle}}
     advice = (
-        "insert a capacity or a mass on the way" if domains - {SIGNAL} else "insert a part with a state (a first-order filter) on the way"
+        "insert a capacity or a mass on the way"
+        if domains - {SIGNAL}
+        else "insert a part with a state (a first-order filter) on the way"
     )
-    return CausalityError(f"algebraic loop: {' -> '.join([*names, names[0]])} depend on each other at the same instant; {advice}", place)
+    return CausalityError(
+        f"algebraic loop: {' -> '.join([*names, names[0]])} depend on each other at the same instant; {advice}", place
+    )

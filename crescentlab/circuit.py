@@ -151,7 +151,9 @@ def _check(options: Options) -> None:
     if options.solver not in SOLVERS:
         raise InputError(f"solver {options.solver!r}: {nearest(options.solver, SOLVERS)}")
     if options.output_step is not None and options.stop / options.output_step > MAX_ROWS:
-        raise InputError(f"output_step {options.output_step:g} s makes more than {MAX_ROWS} rows until {options.stop:g} s; write a longer one")
+        raise InputError(
+            f"output_step {options.output_step:g} s makes more than {MAX_ROWS} rows until {options.stop:g} s; write a longer one"
+        )
 
 
 def _text(value: str | float) -> str:

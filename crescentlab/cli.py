@@ -112,18 +112,29 @@ def _parser() -> tuple[argparse.ArgumentParser, dict[str, argparse.ArgumentParse
     common = _Parser(add_help=False, allow_abbrev=False)
     common.add_argument("-v", "--verbose", action="store_true", default=argparse.SUPPRESS, help="log to stderr")
     common.add_argument(
-        "--no-code", action="store_true", default=argparse.SUPPRESS, help="refuse circuits that bring their own Python files"
+        "--no-code",
+        action="store_true",
+        default=argparse.SUPPRESS,
+        help="refuse circuits that bring their own Python files",
     )
-    parser = _Parser("crescentlab", description="Hydraulic circuits as one global ODE.", allow_abbrev=False, parents=[common])
+    parser = _Parser(
+        "crescentlab", description="Hydraulic circuits as one global ODE.", allow_abbrev=False, parents=[common]
+    )
     parser.add_argument("--version", action="version", version=f"crescentlab {__version__}")
     parser.set_defaults(verbose=False, no_code=False)
     chosen = parser.add_subparsers(dest="command", metavar="COMMAND", title="commands")
     commands: dict[str, argparse.ArgumentParser] = {}
     for name, text in COMMANDS.items():
-        commands[name] = chosen.add_parser(name, help=text, description=f"{text[0].upper()}{text[1:]}.", allow_abbrev=False, parents=[common])
+        commands[name] = chosen.add_parser(
+            name, help=text, description=f"{text[0].upper()}{text[1:]}.", allow_abbrev=False, parents=[common]
+        )
     for name in ("simulate", "check", "graph"):
-        commands[name].add_argument("circuit", metavar="CIRCUIT", help="a circuit file, or the name of a shipped circuit")
-        commands[name].add_argument("--set", action="append", default=[], metavar="NAME=VALUE", help="replace a value; VALUE as in the file")
+        commands[name].add_argument(
+            "circuit", metavar="CIRCUIT", help="a circuit file, or the name of a shipped circuit"
+        )
+        commands[name].add_argument(
+            "--set", action="append", default=[], metavar="NAME=VALUE", help="replace a value; VALUE as in the file"
+        )
     for name in ("simulate", "check"):
         commands[name].add_argument("--json", action="store_true", help="print one JSON object on stdout")
     _simulate(commands["simulate"])
@@ -132,7 +143,9 @@ def _parser() -> tuple[argparse.ArgumentParser, dict[str, argparse.ArgumentParse
     commands["circuits"].add_argument("--copy", metavar="DIR", help="copy the circuit, its parts and tables to DIR")
     commands["graph"].add_argument("-o", "--output", metavar="F.svg", required=True, help="picture: .svg, .png or .pdf")
     commands["results"].add_argument("file", metavar="FILE", help="a result: .nc, .csv or .parquet")
-    commands["results"].add_argument("variables", metavar="VAR", nargs="*", help="variables to print as CSV; * and ? are wild")
+    commands["results"].add_argument(
+        "variables", metavar="VAR", nargs="*", help="variables to print as CSV; * and ? are wild"
+    )
     return parser, commands
 
 
@@ -142,7 +155,9 @@ def _simulate(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--rtol", metavar="R", type=_number, help="relative tolerance of every state")
     parser.add_argument("--output-step", metavar="DT", help="uniform output grid, for example '0.1 ms'")
     parser.add_argument("-o", "--output", metavar="FILE", help=".nc, .csv or .parquet; none writes nothing")
-    parser.add_argument("--record", action="append", default=[], metavar="GLOB", help="variables to write; only * and ? are wild")
+    parser.add_argument(
+        "--record", action="append", default=[], metavar="GLOB", help="variables to write; only * and ? are wild"
+    )
     parser.add_argument("--plot", action="store_true", help="write the circuit's plots as PNG files beside the result")
     parser.add_argument("--quiet", action="store_true", help="no progress and no summary")
 

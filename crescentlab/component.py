@@ -220,7 +220,9 @@ def _check_class(cls: type[Component]) -> None:
     taken: dict[str, str] = {name: f"parameter {name}" for name in cls.model_fields}
     for port in ports:
         if port.role == "undecided" and not cls.family:
-            raise ComponentError(f"{where}: port {port.name} is undecided; only a class with `family = True` may leave it so")
+            raise ComponentError(
+                f"{where}: port {port.name} is undecided; only a class with `family = True` may leave it so"
+            )
         names = [port.name] + [n for k in ("across", "through") for n, _ in port.variables(k) if n != port.name]
         _claim(taken, names, f"port {port.name}", where)
     for kind, title in ((State, "state"), (Held, "held value"), (Observable, "observable")):

@@ -30,7 +30,10 @@ class Domain:
 
 
 HYDRAULIC = Domain(
-    "hydraulic", (("p", units.pressure),), (("q", units.flow),), "a capacity, for example {type: capacity, volume: 10 cm^3}"
+    "hydraulic",
+    (("p", units.pressure),),
+    (("q", units.flow),),
+    "a capacity, for example {type: capacity, volume: 10 cm^3}",
 )
 TRANSLATIONAL = Domain(
     "translational", (("x", units.length), ("v", units.velocity)), (("f", units.force),),
@@ -40,7 +43,9 @@ ROTATIONAL = Domain(
     "rotational", (("phi", units.angle), ("omega", units.speed)), (("torque", units.torque),),
     "a shaft speed, for example {type: speed_source, speed: 2000 rpm}",
 )  # fmt: skip
-CHAMBER = Domain("chamber", (("V", units.volume), ("dV", units.flow)), (("p", units.pressure),), "a part that shapes a volume")
+CHAMBER = Domain(
+    "chamber", (("V", units.volume), ("dV", units.flow)), (("p", units.pressure),), "a part that shapes a volume"
+)
 SIGNAL = Domain("signal", (("", units.ratio),), (), "a source of the signal, for example {type: constant, value: 1}")
 
 Size = int | str | Callable[[Any], int]
@@ -147,12 +152,16 @@ def takes_chamber(description: str, *, size: Size | None = None) -> Any:
 
 def gives_signal(quantity: Any, description: str, *, size: Size | None = None) -> Any:
     """Signal output; ``quantity`` is a field type, or the name of a field that names a quantity."""
-    return Port(SIGNAL, "gives", description, size, quantity if isinstance(quantity, str) else units.quantity_of(quantity))
+    return Port(
+        SIGNAL, "gives", description, size, quantity if isinstance(quantity, str) else units.quantity_of(quantity)
+    )
 
 
 def takes_signal(quantity: Any, description: str, *, size: Size | None = None) -> Any:
     """Signal input; ``quantity`` is a field type, or the name of a field that names a quantity."""
-    return Port(SIGNAL, "takes", description, size, quantity if isinstance(quantity, str) else units.quantity_of(quantity))
+    return Port(
+        SIGNAL, "takes", description, size, quantity if isinstance(quantity, str) else units.quantity_of(quantity)
+    )
 
 
 @dataclass(eq=False)
@@ -198,7 +207,9 @@ def state(
     return State(_named(quantity), description, start, nominal, size)
 
 
-def held(quantity: Any, description: str, *, start: float | str | Callable[[Any], Any] = 0.0, size: Size | None = None) -> Any:
+def held(
+    quantity: Any, description: str, *, start: float | str | Callable[[Any], Any] = 0.0, size: Size | None = None
+) -> Any:
     """A held value, changed only by ``when`` and ``every``."""
     return Held(_named(quantity), description, start, size)
 

@@ -86,7 +86,9 @@ class Design:
     """Parameter values per scope ('' is the circuit's own)."""
 
 
-def elaborate(netlist: Netlist, library: Library, settings: Mapping[str, str] | None = None, *, no_code: bool = False) -> Design:
+def elaborate(
+    netlist: Netlist, library: Library, settings: Mapping[str, str] | None = None, *, no_code: bool = False
+) -> Design:
     """Flatten ``netlist``; ``settings`` are ``--set`` texts by dotted name.
 
     Raises :class:`InputError` with file and line for whatever in the files, or ``--set`` for whatever
@@ -155,11 +157,19 @@ class _Elaboration:
             if "type" not in node.value:
                 raise InputError("the fluid needs a type, for example fluid: {type: simple_oil}", node.place)
             cls = library.fluid(str(node.value["type"].value), node.place_of("type"))
-            made[name] = _instance(cls, node, _scope_lookup(values, netlist), overrides, name, netlist.folder, {"type"}, name)
+            made[name] = _instance(
+                cls, node, _scope_lookup(values, netlist), overrides, name, netlist.folder, {"type"}, name
+            )
         return made
 
     def scope(
-        self, netlist: Netlist, library: Library, prefix: str, passed: Mapping[str, Value], overrides: _Overrides, chain: tuple[Path, ...]
+        self,
+        netlist: Netlist,
+        library: Library,
+        prefix: str,
+        passed: Mapping[str, Value],
+        overrides: _Overrides,
+        chain: tuple[Path, ...],
     ) -> None:
         """Add one circuit's components, nets and outputs under ``prefix`` ('' or 'valve.')."""
         sections = netlist.sections
@@ -170,19 +180,31 @@ class _Elaboration:
             node = netlist.node.find(("components", name))
             full = prefix + name
             if section.type.endswith((".yaml", ".yml")):
-                inner_ports[name] = self.subcircuit(netlist, section.type, node, full, values, library, overrides, chain)
+                inner_ports[name] = self.subcircuit(
+                    netlist, section.type, node, full, values, library, overrides, chain
+                )
             else:
-                self.component(netlist, library.component(section.type, node.place_of("type")), node, full, values, overrides)
+                self.component(
+                    netlist, library.component(section.type, node.place_of("type")), node, full, values, overrides
+                )
         for name, net in sections.nets.items():
             self.net(netlist, prefix, name, net, inner_ports)
         for name in sections.outputs:
             place = netlist.place("outputs", name)
             if not is_expression(sections.outputs[name]):
-                raise InputError(f"output {name!r} must be an expression, for example {name}: '= line.p * valve.q'", place)
+                raise InputError(
+                    f"output {name!r} must be an expression, for example {name}: '= line.p * valve.q'", place
+                )
             self.outputs.append(Output(prefix + name, sections.outputs[name], prefix, place))
 
     def component(
-        self, netlist: Netlist, cls: type[Component], node: Node, full: str, values: dict[str, Value], overrides: _Overrides
+        self,
+        netlist: Netlist,
+        cls: type[Component],
+        node: Node,
+        full: str,
+        values: dict[str, Value],
+        overrides: _Overrides,
     ) -> None:
         lookup = _scope_lookup(values, netlist)
         instance = _instance(cls, node, lookup, overrides, full, netlist.folder, {"type", "start"}, full)
@@ -193,14 +215,18 @@ class _Elaboration:
             raise InputError(f"{full}: start needs keys, for example start: {{p: 1 bar}}", node.place_of("start"))
         for name in given:
             if name not in stateful:
-                raise InputError(f"{full}: no state {name!r} to start: {nearest(name, stateful)}", node.place_of("start", name))
+                raise InputError(
+                    f"{full}: no state {name!r} to start: {nearest(name, stateful)}", node.place_of("start", name)
+                )
         for name, declared in stateful.items():
             text = overrides.take(f"{full}.start.{name}")
             source = Node(text, COMMAND) if text is not None else given.get(name)
             if source is not None:
                 quantity = instance.quantity(declared.quantity)
                 items = source.value if isinstance(source.value, list) else [source]
-                start[name] = np.array([_number(str(i.value), quantity, lookup, f"{full}.start.{name}", i.place) for i in items])
+                start[name] = np.array(
+                    [_number(str(i.value), quantity, lookup, f"{full}.start.{name}", i.place) for i in items]
+                )
         self.instances[full] = Instance(full, instance, node.place, start)
 
     def subcircuit(
@@ -228,18 +254,31 @@ class _Elaboration:
             if name in ("type", "start"):
                 continue
             if name not in part.sections.parameters:
-                raise InputError(f"{full}: {file} has no parameter {name!r}: {nearest(name, part.sections.parameters)}", node.place_of(name))
+                raise InputError(
+                    f"{full}: {file} has no parameter {name!r}: {nearest(name, part.sections.parameters)}",
+                    node.place_of(name),
+                )
             passed[name] = _value(str(child.value), lookup, f"{full}.{name}", child.place)
         _check_passed(part, passed, node, full)
         self.scope(part, self.with_user_files(part, library), full + ".", passed, overrides, (*chain, key))
         for port, net in part.sections.ports.items():
             if net not in part.sections.nets:
-                raise InputError(f"port {port!r} names the net {net!r}, which does not exist: {nearest(net, part.sections.nets)}", part.place("ports", port))
+                raise InputError(
+                    f"port {port!r} names the net {net!r}, which does not exist: {nearest(net, part.sections.nets)}",
+                    part.place("ports", port),
+                )
         return {port: f"{full}.{net}" for port, net in part.sections.ports.items()}
 
     # -- nets ------------------------------------------------------------------------------------
 
-    def net(self, netlist: Netlist, prefix: str, name: str, section: list[str] | NetSection, inner_ports: dict[str, dict[str, str]]) -> None:
+    def net(
+        self,
+        netlist: Netlist,
+        prefix: str,
+        name: str,
+        section: list[str] | NetSection,
+        inner_ports: dict[str, dict[str, str]],
+    ) -> None:
         base = ("nets", name, "ports") if isinstance(section, NetSection) else ("nets", name)
         net = DesignNet(prefix + name, netlist.place("nets", name))
         net.open = name in netlist.sections.ports.values() and prefix == ""
@@ -250,17 +289,25 @@ class _Elaboration:
             place = netlist.place(*base, k) or net.place
             match = re.fullmatch(r"([\w.]+)\.(\w+)(?:\[(\d+|\*)\])?", text.strip())
             if not match:
-                raise InputError(f"net {name}: {text!r} is not a port; write component.port, component.port[2] or component.port[*]", place)
+                raise InputError(
+                    f"net {name}: {text!r} is not a port; write component.port, component.port[2] or component.port[*]",
+                    place,
+                )
             owner, port_name, index = match[1], match[2], match[3]
             if owner in inner_ports:
                 ports = inner_ports[owner]
                 if port_name not in ports:
-                    raise InputError(f"net {name}: subcircuit {owner!r} has no port {port_name!r}: {nearest(port_name, ports)}", place)
+                    raise InputError(
+                        f"net {name}: subcircuit {owner!r} has no port {port_name!r}: {nearest(port_name, ports)}",
+                        place,
+                    )
                 self.joins.append((net.name, ports[port_name]))
                 continue
             instance = self.instances.get(prefix + owner)
             if instance is None or owner not in netlist.sections.components:
-                raise InputError(f"net {name}: no component {owner!r}: {nearest(owner, netlist.sections.components)}", place)
+                raise InputError(
+                    f"net {name}: no component {owner!r}: {nearest(owner, netlist.sections.components)}", place
+                )
             known = {p.name: p for p in type(instance.component).ports()}
             if port_name not in known:
                 raise InputError(f"net {name}: {owner!r} has no port {port_name!r}: {nearest(port_name, known)}", place)
@@ -303,10 +350,15 @@ def _check_passed(part: Netlist, passed: dict[str, Value], node: Node, full: str
         except UnitError:
             continue
         if isinstance(value.value, str) or value.dims != quantity.dims:
-            raise InputError(f"{full}.{name}: this must be a {quantity.title}; write for example {name}: {quantity.example()}", node.place_of(name))
+            raise InputError(
+                f"{full}.{name}: this must be a {quantity.title}; write for example {name}: {quantity.example()}",
+                node.place_of(name),
+            )
 
 
-def _parameter_values(netlist: Netlist, passed: Mapping[str, Value], overrides: _Overrides, prefix: str) -> dict[str, Value]:
+def _parameter_values(
+    netlist: Netlist, passed: Mapping[str, Value], overrides: _Overrides, prefix: str
+) -> dict[str, Value]:
     """Values of a scope's parameters, in any order of writing; a circle is an error."""
     texts = netlist.sections.parameters
     values: dict[str, Value] = {}
@@ -381,7 +433,9 @@ def _number(text: str, quantity: Any, lookup: Any, subject: str, place: Place | 
         if is_expression(text):
             value = evaluate(text, lookup)
             if isinstance(value.value, str) or value.dims != quantity.dims:
-                raise ExpressionError(f"the expression gives {value.quantity.title} [{value.quantity.si}], not {quantity.title} [{quantity.si}]")
+                raise ExpressionError(
+                    f"the expression gives {value.quantity.title} [{value.quantity.si}], not {quantity.title} [{quantity.si}]"
+                )
             return float(value.value)
         return float(quantity.parse(text))
     except InputError as error:
@@ -389,7 +443,14 @@ def _number(text: str, quantity: Any, lookup: Any, subject: str, place: Place | 
 
 
 def _instance(
-    cls: type[Any], node: Node, lookup: Any, overrides: _Overrides, full: str, folder: Path, skip: set[str], subject: str
+    cls: type[Any],
+    node: Node,
+    lookup: Any,
+    overrides: _Overrides,
+    full: str,
+    folder: Path,
+    skip: set[str],
+    subject: str,
 ) -> Any:
     """Validate a component or fluid; expressions become numbers first, ``--set`` texts replace."""
     assert isinstance(node.value, dict)
@@ -434,11 +495,15 @@ def _plain(node: Node, info: Any, lookup: Any, subject: str) -> Any:
             return f"{float(value.value)!r} {value.quantity.si if value.quantity.name != 'ratio' else ''}".strip()
         if quantity is None:
             if value.dims != QUANTITIES["ratio"].dims:
-                raise ExpressionError(f"the expression gives {value.quantity.title} [{value.quantity.si}], where a plain number or word belongs")
+                raise ExpressionError(
+                    f"the expression gives {value.quantity.title} [{value.quantity.si}], where a plain number or word belongs"
+                )
             number = float(value.value)
             return int(number) if number.is_integer() else number
         if value.dims != quantity.dims:
-            raise ExpressionError(f"the expression gives {value.quantity.title} [{value.quantity.si}], not {quantity.title} [{quantity.si}]")
+            raise ExpressionError(
+                f"the expression gives {value.quantity.title} [{value.quantity.si}], not {quantity.title} [{quantity.si}]"
+            )
         return float(value.value)
     except InputError as error:
         raise _described(error, subject, node.place) from None

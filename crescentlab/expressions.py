@@ -95,7 +95,14 @@ def names_in(text: str) -> set[str]:
 def _literal_pattern() -> re.Pattern[str]:
     units = {u for q in QUANTITIES.values() for u in q.units if u and u[0].isalpha()} | {"°", "°/s"}
     ordered = sorted(units, key=len, reverse=True)
-    spelled = [re.sub(r"(?<=[a-z)])2", r"(?:\\^2|²|2)", re.sub(r"(?<=[a-z)])3", r"(?:\\^3|³|3)", re.escape(u).replace(r"\ ", r"[ ·]"))) for u in ordered]
+    spelled = [
+        re.sub(
+            r"(?<=[a-z)])2",
+            r"(?:\\^2|²|2)",
+            re.sub(r"(?<=[a-z)])3", r"(?:\\^3|³|3)", re.escape(u).replace(r"\ ", r"[ ·]")),
+        )
+        for u in ordered
+    ]
     return re.compile(rf"(?<![\w.])(\d+\.?\d*(?:[eE][+-]?\d+)?|\.\d+)\s*({'|'.join(spelled)})(?![\w²³^])")
 
 
@@ -116,7 +123,9 @@ def _parse(body: str) -> tuple[ast.expr, dict[str, Value]]:
         raise ExpressionError(error.message) from None
     except (SyntaxError, ValueError, RecursionError, MemoryError):
         hint = " (powers are written with **)" if "^" in body else ""
-        raise ExpressionError(f"{body!r} is not an expression{hint}; write arithmetic with parameters, for example = pi / 4 * d**2") from None
+        raise ExpressionError(
+            f"{body!r} is not an expression{hint}; write arithmetic with parameters, for example = pi / 4 * d**2"
+        ) from None
 
 
 def _dotted(node: ast.AST) -> str | None:
@@ -148,7 +157,12 @@ _WHOLE: dict[str, Callable[[float], float]] = {"floor": math.floor, "ceil": math
 _SAME = {"min": maths.minimum, "max": maths.maximum}
 _REDUCE: dict[str, Callable[[Any], Any]] = {"sum": maths.total, "mean": lambda v: maths.total(v) / len(v)}
 FUNCTIONS = sorted([*_PLAIN, *_WHOLE, *_SAME, *_REDUCE, "abs", "sqrt", "where", "involute", "atan2"])
-_COMPARE: dict[type[ast.cmpop], Callable[[Any, Any], Any]] = {ast.Lt: operator.lt, ast.LtE: operator.le, ast.Gt: operator.gt, ast.GtE: operator.ge}
+_COMPARE: dict[type[ast.cmpop], Callable[[Any, Any], Any]] = {
+    ast.Lt: operator.lt,
+    ast.LtE: operator.le,
+    ast.Gt: operator.gt,
+    ast.GtE: operator.ge,
+}
 
 
 class _Walker:
@@ -239,7 +253,9 @@ class _Walker:
             a, b = self.alike(values[0], values[1], "compare")
             return Value(_float(maths.atan2(a.value, b.value)), QUANTITIES["angle"])
         if len(values) != 1 or name in _SAME:
-            raise self.fail(f"{name} takes {'two or more arguments' if name in _SAME else 'three arguments' if name == 'where' else 'one argument'}")
+            raise self.fail(
+                f"{name} takes {'two or more arguments' if name in _SAME else 'three arguments' if name == 'where' else 'one argument'}"
+            )
         return self.single(name, values[0])
 
     def single(self, name: str, value: Value) -> Value:
@@ -275,7 +291,10 @@ class _Walker:
             raise self.fail("a scalar has no elements") from None
         if not 1 <= index.value <= n:
             raise self.fail(f"element {index.value} of a vector of {n}")
-        return Value(whole.value[..., index.value - 1] if isinstance(whole.value, np.ndarray) else whole.value[index.value - 1], whole.quantity)
+        return Value(
+            whole.value[..., index.value - 1] if isinstance(whole.value, np.ndarray) else whole.value[index.value - 1],
+            whole.quantity,
+        )
 
 
 def _float(value: Any) -> Any:

@@ -23,7 +23,9 @@ class Fluid(BaseModel):
 
     model_config = ConfigDict(extra="forbid", frozen=True, validate_default=True)
 
-    tension: bool = Field(default=False, description="true: pressures below absolute zero warn instead of ending the run")
+    tension: bool = Field(
+        default=False, description="true: pressures below absolute zero warn instead of ending the run"
+    )
     atmospheric_pressure: Pressure = Field(default=P_ATM, gt=0, description="absolute pressure at 0 bar gauge")
 
     def density(self, p: Expr) -> Expr:

@@ -64,7 +64,9 @@ def build(design: Design) -> Graph:
     graph: nx.MultiGraph[tuple[str, str]] = nx.MultiGraph()
     graph.add_nodes_from((("component", name) for name in design.instances), bipartite=0)
     graph.add_nodes_from((("net", net.name) for net in nets), bipartite=1)
-    graph.add_edges_from((("component", m.instance), ("net", net.name), {"member": m}) for net in nets for m in net.members)
+    graph.add_edges_from(
+        (("component", m.instance), ("net", net.name), {"member": m}) for net in nets for m in net.members
+    )
     result = Graph(design, nets, graph)
     _check_connections(result)
     for net in nets:
@@ -90,13 +92,21 @@ def _unrolled(design: Design, source: DesignNet) -> list[Net]:
             first = next(iter(vectors))
             raise InputError(
                 f"net {source.name}: {first} has {vectors[first]} elements and {ref} is a single one; "
-                f"join an element, \"{first}[1]\", or put all on one net, \"{first}[*]\"",
+                f'join an element, "{first}[1]", or put all on one net, "{first}[*]"',
                 ref.place,
             )
         if n != length:
-            raise InputError(f"net {source.name}: {next(iter(vectors))} has {length} elements, {ref} has {n}; join vectors of equal size", ref.place)
+            raise InputError(
+                f"net {source.name}: {next(iter(vectors))} has {length} elements, {ref} has {n}; join vectors of equal size",
+                ref.place,
+            )
     return [
-        Net(f"{source.name}[{k + 1}]", source, domain, [Member(ref.instance, ref.port, k, True, ref.place) for ref in source.ports])
+        Net(
+            f"{source.name}[{k + 1}]",
+            source,
+            domain,
+            [Member(ref.instance, ref.port, k, True, ref.place) for ref in source.ports],
+        )
         for k in range(length)
     ]
 
@@ -107,9 +117,13 @@ def _size(design: Design, ref: PortRef) -> int | None:
     if ref.element is None:
         return n
     if n is None:
-        raise InputError(f"{ref}: port {ref.port.name} is a single one; write {ref.instance}.{ref.port.name}", ref.place)
+        raise InputError(
+            f"{ref}: port {ref.port.name} is a single one; write {ref.instance}.{ref.port.name}", ref.place
+        )
     if isinstance(ref.element, int) and not 1 <= ref.element <= n:
-        raise InputError(f"{ref}: port {ref.port.name} has {n} element{'' if n == 1 else 's'}, counted from 1", ref.place)
+        raise InputError(
+            f"{ref}: port {ref.port.name} has {n} element{'' if n == 1 else 's'}, counted from 1", ref.place
+        )
     return n
 
 
@@ -138,7 +152,9 @@ def _check_connections(graph: Graph) -> None:
             if member.key in where:
                 other = where[member.key]
                 again = "twice on the net" if other is net else f"on the nets {other.source.name} and"
-                raise InputError(f"{member} is connected {again} {net.source.name}; a port joins one net once", member.place)
+                raise InputError(
+                    f"{member} is connected {again} {net.source.name}; a port joins one net once", member.place
+                )
             where[member.key] = net
     for name, instance in graph.design.instances.items():
         for port in type(instance.component).ports():
@@ -149,7 +165,8 @@ def _check_connections(graph: Graph) -> None:
                 if (name, port.name, k) not in where:
                     shown = f"{name}.{port.name}" + ("" if n is None else f"[{k + 1}]")
                     raise InputError(
-                        f"{shown} ({port.description}) is not connected; add it to a net, or join a {_stopper(port)}", instance.place
+                        f"{shown} ({port.description}) is not connected; add it to a net, or join a {_stopper(port)}",
+                        instance.place,
                     )
 
 

@@ -56,7 +56,8 @@ class Library:
         for name, found in _classes(module):
             if name in components or name in fluids:
                 raise InputError(
-                    f"{path.name}: class {found.__name__} would be the type {name!r}, which already exists; rename the class", place
+                    f"{path.name}: class {found.__name__} would be the type {name!r}, which already exists; rename the class",
+                    place,
                 )
             _put(components, fluids, name, found)
         return Library(components, fluids)
@@ -91,14 +92,21 @@ def _put(components: dict[str, type[Component]], fluids: dict[str, type[Fluid]],
 def _classes(module: ModuleType) -> Iterator[tuple[str, type]]:
     """Public component and fluid classes that the module itself defines."""
     for name, found in vars(module).items():
-        if inspect.isclass(found) and found.__module__ == module.__name__ and not name.startswith("_") and issubclass(found, (Component, Fluid)):
+        if (
+            inspect.isclass(found)
+            and found.__module__ == module.__name__
+            and not name.startswith("_")
+            and issubclass(found, (Component, Fluid))
+        ):
             yield snake_case(name), found
 
 
 @cache
 def _load_file(path: Path, place: Place | None) -> ModuleType:
     if not path.is_file():
-        raise InputError(f"the library file {path.name} does not exist; it is looked for beside the circuit file", place)
+        raise InputError(
+            f"the library file {path.name} does not exist; it is looked for beside the circuit file", place
+        )
     name = f"crescentlab_user_{path.stem}_{abs(hash(str(path.resolve()))):x}"
     spec = importlib.util.spec_from_file_location(name, path)
     if spec is None or spec.loader is None:
@@ -115,5 +123,7 @@ def _load_file(path: Path, place: Place | None) -> ModuleType:
         frames = [f for f in traceback.extract_tb(error.__traceback__) if f.filename == str(path)]
         line = frames[-1].lineno if frames else getattr(error, "lineno", None)
         where = f" (line {line})" if line else ""
-        raise InputError(f"the library file {path.name} does not import: {type(error).__name__}: {error}{where}", place) from None
+        raise InputError(
+            f"the library file {path.name} does not import: {type(error).__name__}: {error}{where}", place
+        ) from None
     return module

@@ -100,7 +100,9 @@ fabs = _elementwise(ca.fabs, np.abs, "Absolute value.")
 sign = _elementwise(ca.sign, np.sign, "-1, 0 or 1; jumps without an event.")
 
 
-def _pairwise(symbolic: Callable[[ca.SX, ca.SX], ca.SX], numeric: Callable[[Any, Any], Any], doc: str) -> Callable[[Any, Any], Any]:
+def _pairwise(
+    symbolic: Callable[[ca.SX, ca.SX], ca.SX], numeric: Callable[[Any, Any], Any], doc: str
+) -> Callable[[Any, Any], Any]:
     def function(a: Any, b: Any) -> Any:
         if isinstance(a, Sym) or isinstance(b, Sym):
             return Sym.of(a)._zip(b, symbolic)
@@ -123,9 +125,7 @@ def not_(condition: Any) -> Any:
 
 
 def _symbolic(*values: Any) -> bool:
-    return any(
-        isinstance(v, (Sym, Condition)) or (isinstance(v, (list, tuple)) and _symbolic(*v)) for v in values
-    )
+    return any(isinstance(v, (Sym, Condition)) or (isinstance(v, (list, tuple)) and _symbolic(*v)) for v in values)
 
 
 def where(condition: Any, a: Any, b: Any) -> Any:
@@ -163,7 +163,11 @@ def stack(*values: Any) -> Any:
 def total(vector: Any) -> Any:
     """Sum of a vector's elements; 0 for an empty one."""
     if isinstance(vector, Sym):
-        return Sym(ca.sum1(vector.sx)) if vector.shape not in ((), (0,)) else (vector if vector.shape == () else Sym.of(0.0))
+        return (
+            Sym(ca.sum1(vector.sx))
+            if vector.shape not in ((), (0,))
+            else (vector if vector.shape == () else Sym.of(0.0))
+        )
     return float(np.sum(vector))
 
 

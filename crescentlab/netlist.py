@@ -20,7 +20,6 @@ from crescentlab.units import QUANTITIES, Time
 from crescentlab.yaml_text import Node, quoted, read
 
 
-
 def _no_keyword(name: str) -> str:
     for word in name.split("."):
         if keyword.iskeyword(word):
@@ -60,9 +59,13 @@ class SimulationSection(_Section):
     """How long and how exactly to integrate."""
 
     stop: Time = Field(default=1.0, gt=0, description="end time")
-    solver: Literal["auto", "lsoda", "bdf", "radau", "rk45", "dop853"] = Field(default="auto", description="integration method")
+    solver: Literal["auto", "lsoda", "bdf", "radau", "rk45", "dop853"] = Field(
+        default="auto", description="integration method"
+    )
     rtol: float = Field(default=1e-6, gt=0, lt=1, description="relative tolerance of every state")
-    max_step: Time | None = Field(default=None, gt=0, description="longest step; default from the circuit's own time scales")
+    max_step: Time | None = Field(
+        default=None, gt=0, description="longest step; default from the circuit's own time scales"
+    )
     output_step: Time | None = Field(default=None, gt=0, description="uniform output grid; default the accepted steps")
     stop_when: str | None = Field(default=None, description="a condition that ends the run: line.p > 9 bar")
 
@@ -127,7 +130,10 @@ class Netlist:
         if sections.fluid is not None and sections.fluids:
             raise InputError("write either fluid: or fluids:, not both", node.place_of("fluids"))
         if sections.ports and sections.simulation.stop_when:
-            raise InputError("a subcircuit cannot stop the run; move stop_when to the circuit", node.place_of("simulation", "stop_when"))
+            raise InputError(
+                "a subcircuit cannot stop the run; move stop_when to the circuit",
+                node.place_of("simulation", "stop_when"),
+            )
         _namespace(sections, node)
         _check_display(sections, node)
         return Netlist(sections, node, name, folder)
@@ -155,12 +161,17 @@ def _collections(node: Node) -> None:
             if child.value == "":
                 child.value = kind()
                 continue
-            raise InputError(f"{key}: needs {'keys' if kind is dict else 'a list'}, for example {key}: {example}", node.place_of(key))
+            raise InputError(
+                f"{key}: needs {'keys' if kind is dict else 'a list'}, for example {key}: {example}", node.place_of(key)
+            )
     components = node.value.get("components")
     if components is not None and isinstance(components.value, dict):
         for name, child in components.value.items():
             if not isinstance(child.value, dict):
-                raise InputError(f"component {name!r} needs keys, for example {name}: {{type: orifice, area: 5 mm^2}}", components.place_of(name))
+                raise InputError(
+                    f"component {name!r} needs keys, for example {name}: {{type: orifice, area: 5 mm^2}}",
+                    components.place_of(name),
+                )
 
 
 def _namespace(sections: CircuitFile, node: Node) -> None:
@@ -169,7 +180,9 @@ def _namespace(sections: CircuitFile, node: Node) -> None:
             raise InputError(f"{name!r} names both a component and a net; rename one", node.place_of("nets", name))
     for name in sections.parameters:
         if name in sections.components or name in sections.nets:
-            raise InputError(f"{name!r} names a parameter and a component or net; rename one", node.place_of("parameters", name))
+            raise InputError(
+                f"{name!r} names a parameter and a component or net; rename one", node.place_of("parameters", name)
+            )
 
 
 def _check_display(sections: CircuitFile, node: Node) -> None:
@@ -216,7 +229,9 @@ def explain(model: type[BaseModel], error: ValidationError, node: Node, subject:
         return InputError(f"{where}{key!r} is not a name; use letters, digits and _, beginning with a letter", place)
     if kind in ("float_parsing", "float_type") and isinstance(given, str):
         return InputError(f"{where}{key}: {given!r} is not a number", place)
-    return InputError(f"{where}{key + ': ' if key else ''}{said[0].lower() + said[1:]}{', not' + value if value else ''}", place)
+    return InputError(
+        f"{where}{key + ': ' if key else ''}{said[0].lower() + said[1:]}{', not' + value if value else ''}", place
+    )
 
 
 def _fields_at(model: type[BaseModel], path: list[Any]) -> list[str]:

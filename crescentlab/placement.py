@@ -55,7 +55,10 @@ def _part(graph: nx.Graph, sizes: Sizes) -> Places:
     if len(nodes) > LARGE:
         starts = [nx.spring_layout(ordered, seed=1)]
     else:
-        starts = [nx.kamada_kawai_layout(ordered, pos=start) for start in (nx.circular_layout(ordered), _jittered(nx.spectral_layout(ordered)))]
+        starts = [
+            nx.kamada_kawai_layout(ordered, pos=start)
+            for start in (nx.circular_layout(ordered), _jittered(nx.spectral_layout(ordered)))
+        ]
     drawn = [_spread(np.array([start[n] for n in nodes]), size, lines) for start in starts]
     at = min(drawn, key=lambda each: _Improving(each, size, lines).cost())
     if len(nodes) <= LARGE:
@@ -96,7 +99,9 @@ def _apart(at: np.ndarray, size: np.ndarray) -> np.ndarray:
             break
         sideways = over[..., 0] < over[..., 1]
         away = np.where(gap == 0, np.sign(np.arange(len(at))[:, None] - np.arange(len(at)))[..., None], np.sign(gap))
-        push = np.stack([np.where(clash & sideways, over[..., 0], 0), np.where(clash & ~sideways, over[..., 1], 0)], axis=2)
+        push = np.stack(
+            [np.where(clash & sideways, over[..., 0], 0), np.where(clash & ~sideways, over[..., 1], 0)], axis=2
+        )
         at += 0.3 * (away * push).sum(axis=1)
     return at
 
@@ -141,7 +146,12 @@ class _Improving:
         a, b = self.at[self.lines[which, 0]], self.at[self.lines[which, 1]]
         length = np.hypot(*(a - b).T)
         long = np.maximum(length - LENGTH, 0)
-        return float(0.25 * length.sum() + 0.2 * (long**2).sum() + 2.0 * self.crossings(which, a, b) + 3.0 * self.hits(np.arange(len(self.at)), which))
+        return float(
+            0.25 * length.sum()
+            + 0.2 * (long**2).sum()
+            + 2.0 * self.crossings(which, a, b)
+            + 3.0 * self.hits(np.arange(len(self.at)), which)
+        )
 
     def crossings(self, which: np.ndarray, a: np.ndarray, b: np.ndarray) -> int:
         c, d = self.at[self.lines[:, 0]], self.at[self.lines[:, 1]]
@@ -171,4 +181,6 @@ class _Improving:
 
 def _turn(a: np.ndarray, b: np.ndarray, c: np.ndarray) -> np.ndarray:
     """Twice the area of the triangle a b c, positive if it turns left."""
-    return np.asarray((b[..., 0] - a[..., 0]) * (c[..., 1] - a[..., 1]) - (b[..., 1] - a[..., 1]) * (c[..., 0] - a[..., 0]))
+    return np.asarray(
+        (b[..., 0] - a[..., 0]) * (c[..., 1] - a[..., 1]) - (b[..., 1] - a[..., 1]) * (c[..., 0] - a[..., 0])
+    )

@@ -56,7 +56,9 @@ def check_plots(netlist: Netlist, system: System) -> None:
             try:
                 system.find(name.partition("[")[0])
             except InputError as error:
-                place = netlist.place("plots", k, *where) or netlist.place("plots", k, where[0]) or netlist.place("plots")
+                place = (
+                    netlist.place("plots", k, *where) or netlist.place("plots", k, where[0]) or netlist.place("plots")
+                )
                 raise InputError(f"plots: {error.message}", place) from None
 
 
@@ -65,7 +67,9 @@ def _sections(result: Result) -> Iterable[PlotSection]:
     if written:
         return written
     names = result.net_pressures() or [n for n in result.system.state_names if "[" not in n][:LINES_PER_PLOT]
-    return [PlotSection(y=names[k : k + LINES_PER_PLOT], title=result.title) for k in range(0, len(names), LINES_PER_PLOT)]
+    return [
+        PlotSection(y=names[k : k + LINES_PER_PLOT], title=result.title) for k in range(0, len(names), LINES_PER_PLOT)
+    ]
 
 
 def _save(figure: Figure, path: Path) -> None:

@@ -119,7 +119,9 @@ class Result:
 
     def net_pressures(self) -> list[str]:
         """Pressures of the circuit's own hydraulic nets, those inside subcircuits left out."""
-        nets = [net.name for net in self.design.nets if "." not in net.name and net.ports[0].port.domain.name == "hydraulic"]
+        nets = [
+            net.name for net in self.design.nets if "." not in net.name and net.ports[0].port.domain.name == "hydraulic"
+        ]
         return [f"{name}.p" for name in nets if f"{name}.p" in self.system.variables]
 
     def attributes(self) -> dict[str, Any]:
@@ -197,14 +199,18 @@ def matching(globs: Sequence[str], names: Sequence[str], subject: str) -> list[s
 def check_target(path: Path) -> None:
     """Refuse an output file that cannot be written, before the run."""
     if path.suffix not in SUFFIXES:
-        raise InputError(f"-o {path}: the suffix {path.suffix!r} is none of {', '.join(SUFFIXES)}; write for example -o {path.stem or 'result'}.nc")
+        raise InputError(
+            f"-o {path}: the suffix {path.suffix!r} is none of {', '.join(SUFFIXES)}; write for example -o {path.stem or 'result'}.nc"
+        )
     if not path.parent.is_dir():
         raise InputError(f"-o {path}: the folder {path.parent} does not exist; make it first")
     if path.is_dir() or not os.access(path if path.exists() else path.parent, os.W_OK):
         raise InputError(f"-o {path}: it cannot be written; choose another place")
 
 
-def write_series(path: Path, time: np.ndarray, columns: dict[str, np.ndarray], units: dict[str, str], attributes: dict[str, Any]) -> None:
+def write_series(
+    path: Path, time: np.ndarray, columns: dict[str, np.ndarray], units: dict[str, str], attributes: dict[str, Any]
+) -> None:
     """Write series to a file; the suffix chooses the format. An old file is replaced when the new one is complete."""
     part = path.with_name(f".{path.stem}-{os.getpid()}{path.suffix}")
     try:
@@ -216,7 +222,9 @@ def write_series(path: Path, time: np.ndarray, columns: dict[str, np.ndarray], u
         part.unlink(missing_ok=True)
 
 
-def _write_csv(path: Path, time: np.ndarray, columns: dict[str, np.ndarray], units: dict[str, str], attributes: dict[str, Any]) -> None:
+def _write_csv(
+    path: Path, time: np.ndarray, columns: dict[str, np.ndarray], units: dict[str, str], attributes: dict[str, Any]
+) -> None:
     with path.open("w", newline="", encoding="utf-8") as file:
         writer = csv.writer(file)
         writer.writerow(["time [s]", *[f"{n} [{units[n]}]" for n in columns]])
@@ -224,7 +232,9 @@ def _write_csv(path: Path, time: np.ndarray, columns: dict[str, np.ndarray], uni
             writer.writerow([repr(v) for v in row])
 
 
-def _write_parquet(path: Path, time: np.ndarray, columns: dict[str, np.ndarray], units: dict[str, str], attributes: dict[str, Any]) -> None:
+def _write_parquet(
+    path: Path, time: np.ndarray, columns: dict[str, np.ndarray], units: dict[str, str], attributes: dict[str, Any]
+) -> None:
     import pyarrow as pa
     import pyarrow.parquet as pq
 
@@ -234,7 +244,9 @@ def _write_parquet(path: Path, time: np.ndarray, columns: dict[str, np.ndarray],
     pq.write_table(pa.table([time, *columns.values()], schema=schema), path)
 
 
-def _write_netcdf(path: Path, time: np.ndarray, columns: dict[str, np.ndarray], units: dict[str, str], attributes: dict[str, Any]) -> None:
+def _write_netcdf(
+    path: Path, time: np.ndarray, columns: dict[str, np.ndarray], units: dict[str, str], attributes: dict[str, Any]
+) -> None:
     """netCDF4 as h5netcdf lays it out, but with the list of all variables of the time axis written once.
 
     Attached one by one, n variables rewrite that list n times: 128 MB of waste in a file of 4000 variables.

@@ -51,7 +51,9 @@ class Sheet:
 def check_target(path: Path) -> None:
     """Refuse a picture that cannot be written."""
     if path.suffix not in SUFFIXES:
-        raise InputError(f"-o {path}: a schematic is {', '.join(SUFFIXES)}; write for example -o {path.stem or 'circuit'}.svg")
+        raise InputError(
+            f"-o {path}: a schematic is {', '.join(SUFFIXES)}; write for example -o {path.stem or 'circuit'}.svg"
+        )
     if not path.parent.is_dir():
         raise InputError(f"-o {path}: the folder {path.parent} does not exist; make it first")
 
@@ -103,7 +105,10 @@ def _port(ref: PortRef) -> str:
 def _figure(shown: Sheet, title: str) -> Any:
     from matplotlib.figure import Figure
 
-    sizes = {n: (max(len(name) * CHARACTER, len(kind) * 0.85 * CHARACTER) + 0.16, 0.4) for n, (name, kind) in shown.boxes.items()}
+    sizes = {
+        n: (max(len(name) * CHARACTER, len(kind) * 0.85 * CHARACTER) + 0.16, 0.4)
+        for n, (name, kind) in shown.boxes.items()
+    }
     sizes |= {n: (len(name) * 0.8 * CHARACTER + 0.08, 0.36) for n, (name, _) in shown.dots.items()}
     graph = nx.Graph()
     graph.add_nodes_from(sizes)
@@ -133,7 +138,15 @@ def _draw_lines(axes: Any, shown: Sheet, places: Any, sizes: Any) -> None:
         shift = 0.09 * joined[line.component, line.net]  # a second port of one component on the same net
         style = {"linestyle": (0, (3, 2))} if line.role == "reads" else {}
         width = 2.4 if line.role == "gives" else 1.1
-        axes.plot([x0 + shift, x1], [y0, y1], color=COLOURS[line.domain], linewidth=width, zorder=1, solid_capstyle="round", **style)
+        axes.plot(
+            [x0 + shift, x1],
+            [y0, y1],
+            color=COLOURS[line.domain],
+            linewidth=width,
+            zorder=1,
+            solid_capstyle="round",
+            **style,
+        )
         tx, ty = _beside(x0 + shift, y0, x1, y1, sizes[line.component], len(line.port) * 0.025 + 0.03, texts)
         axes.text(
             tx, ty, line.port, fontsize=5.5, color=COLOURS[line.domain], ha="center", va="center", zorder=4,
@@ -142,7 +155,13 @@ def _draw_lines(axes: Any, shown: Sheet, places: Any, sizes: Any) -> None:
 
 
 def _beside(
-    x0: float, y0: float, x1: float, y1: float, size: tuple[float, float], half: float, texts: list[tuple[float, float, float]]
+    x0: float,
+    y0: float,
+    x1: float,
+    y1: float,
+    size: tuple[float, float],
+    half: float,
+    texts: list[tuple[float, float, float]],
 ) -> tuple[float, float]:
     """Where a port's name stands on its line: just outside the box, further out where other names stand."""
     dx, dy = x1 - x0, y1 - y0
@@ -192,7 +211,9 @@ def _draw_dots(axes: Any, shown: Sheet, places: Any) -> None:
 def _draw_legend(axes: Any, shown: Sheet, x: float, y: float) -> None:
     """Domains that occur, then the kinds of lines."""
     present = {domain for _, domain in shown.dots.values()}
-    entries: list[tuple[str, str, dict[str, Any]]] = [(d, c, {"linewidth": 1.6}) for d, c in COLOURS.items() if d in present]
+    entries: list[tuple[str, str, dict[str, Any]]] = [
+        (d, c, {"linewidth": 1.6}) for d, c in COLOURS.items() if d in present
+    ]
     entries.append(("gives", INK, {"linewidth": 2.4}))
     entries.append(("takes", INK, {"linewidth": 1.1}))
     if any(line.role == "reads" for line in shown.lines):

@@ -144,7 +144,9 @@ class Sym:
         return (self[i] for i in range(len(self)))
 
     def __float__(self) -> float:
-        raise TypeError("a symbol has no value while equations are traced; use crescentlab.maths instead of math or float()")
+        raise TypeError(
+            "a symbol has no value while equations are traced; use crescentlab.maths instead of math or float()"
+        )
 
     __int__ = __float__
     __index__ = __float__
@@ -196,7 +198,9 @@ class Condition:
         return Not(self)
 
     def __bool__(self) -> bool:
-        raise TypeError("a condition is neither true nor false while equations are traced; use where(), &, | and not_()")
+        raise TypeError(
+            "a condition is neither true nor false while equations are traced; use where(), &, | and not_()"
+        )
 
 
 class Relation(Condition):

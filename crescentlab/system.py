@@ -236,7 +236,9 @@ class System:
         key = tuple(names)
         if key not in self._functions:
             column = [e for name in names for e in self.find(name).expression()]
-            self._functions[key] = ca.Function("v", self.arguments, [ca.densify(ca.vertcat(*column)) if column else ca.SX(0, 1)])
+            self._functions[key] = ca.Function(
+                "v", self.arguments, [ca.densify(ca.vertcat(*column)) if column else ca.SX(0, 1)]
+            )
         return self._functions[key]
 
     def contents(self) -> dict[str, tuple[ca.SX, ca.SX, ca.SX]]:
@@ -255,17 +257,26 @@ class System:
             instance = design.instances[name]
             component = instance.component
             if type(shape) is not type(component):
-                component = type(shape).model_construct(**{n: getattr(component, n) for n in type(component).model_fields})
+                component = type(shape).model_construct(
+                    **{n: getattr(component, n) for n in type(component).model_fields}
+                )
             if structure_of(component) != structure_of(shape):
                 raise InputError(f"{name}: this value changes the structure; assemble the circuit anew", instance.place)
             p += [float(getattr(component, n)) for n in self.plan.traces[name].parameters]
             mine = [fluids[f] for f in self.plan.fluids[name]]
-            x0 += [_start(instance.start, s, component, mine, name, instance.place) for s in type(component).declared(State)]
-            h0 += [_start(instance.start, s, component, mine, name, instance.place) for s in type(component).declared(Held)]
+            x0 += [
+                _start(instance.start, s, component, mine, name, instance.place)
+                for s in type(component).declared(State)
+            ]
+            h0 += [
+                _start(instance.start, s, component, mine, name, instance.place) for s in type(component).declared(Held)
+            ]
         return Values(np.array(p), _join(x0), _join(h0))
 
 
-def _start(given: dict[str, Array], declared: State | Held, component: Component, fluids: list[Any], name: str, place: Any) -> Array:
+def _start(
+    given: dict[str, Array], declared: State | Held, component: Component, fluids: list[Any], name: str, place: Any
+) -> Array:
     default = component.start_of(declared, fluids[0] if fluids else None)
     if declared.name not in given:
         return default
@@ -335,7 +346,9 @@ class _Assembly:
                 mine[k] = element
         for name, trace in plan.traces.items():
             self.inputs[name] = _cat([self.value(s) for s in plan.sources[name]])
-        derivative = _cat([self.call(n, tr.derivative, self.inputs[n]) for n, tr in plan.traces.items() if tr.states.size])
+        derivative = _cat(
+            [self.call(n, tr.derivative, self.inputs[n]) for n, tr in plan.traces.items() if tr.states.size]
+        )
         clock = _cat([self.call(n, tr.clock, self.inputs[n]) for n, tr in plan.traces.items() if tr.clock.numel_out(0)])
         relations, scales = self.relations()
         events, conditions, periods = self.events()
@@ -343,7 +356,10 @@ class _Assembly:
             self.variables()  # a wrong output is told before the run
         extra = self.stop(events, conditions, relations, scales)
         b = ca.vertcat(self.b_local, extra)
-        derivative, g = ca.vertsplit(_shared(ca.densify(_cat([derivative, *relations]))), [0, derivative.numel(), derivative.numel() + _cat(relations).numel()])
+        derivative, g = ca.vertsplit(
+            _shared(ca.densify(_cat([derivative, *relations]))),
+            [0, derivative.numel(), derivative.numel() + _cat(relations).numel()],
+        )
         return System(
             plan, self.t, self.x, self.h, b, self.p, derivative, g, _cat(scales), _cat(conditions), _cat(periods), clock, tuple(events),
             *self.names(State), self.nominal(), *self.names(Held), self.bits(g, b), self.variables,
@@ -356,7 +372,9 @@ class _Assembly:
         for name, component in self.plan.components.items():
             for declared in type(component).declared(kind):
                 n = component.size_of(declared.size)
-                names += [f"{name}.{declared.name}"] if n is None else [f"{name}.{declared.name}[{k + 1}]" for k in range(n)]
+                names += (
+                    [f"{name}.{declared.name}"] if n is None else [f"{name}.{declared.name}[{k + 1}]" for k in range(n)]
+                )
                 quantities += [component.quantity(declared.quantity)] * (1 if n is None else n)
         return names, quantities
 
@@ -392,7 +410,14 @@ class _Assembly:
             lasts = self.call(name, trace.period, self.inputs[name])
             for event in trace.events:
                 messages = tuple(f"{name}.{n}" for n in event.message_names)
-                events.append(SystemEvent(f"{name}.{event.name}", event.kind, f"{name}: {event.message}" if event.message else "", messages))
+                events.append(
+                    SystemEvent(
+                        f"{name}.{event.name}",
+                        event.kind,
+                        f"{name}: {event.message}" if event.message else "",
+                        messages,
+                    )
+                )
                 if event.condition is not None:
                     conditions.append(holds[event.condition])
                 if event.period is not None:
@@ -417,7 +442,9 @@ class _Assembly:
         try:
             value = evaluate(text, self.lookup(self.variables(), ""))
             if not isinstance(value.value, Condition):
-                raise ExpressionError(f"{text!r} is no condition on the circuit's variables; write for example line.p > 9 bar")
+                raise ExpressionError(
+                    f"{text!r} is no condition on the circuit's variables; write for example line.p > 9 bar"
+                )
         except InputError as error:
             raise error.at(place) from None
         conditions.append(value.value.lower(bit))
@@ -477,7 +504,9 @@ class _Assembly:
         self.pending = {output.name: output for output in self.plan.design.outputs}
         for output in self.plan.design.outputs:
             if output.name in found and output.name not in self.resolved:
-                raise InputError(f"output {output.name!r} has the name of an existing variable; rename it", output.place)
+                raise InputError(
+                    f"output {output.name!r} has the name of an existing variable; rename it", output.place
+                )
             self.resolve(output, found)
         return found
 
@@ -485,7 +514,13 @@ class _Assembly:
         cls = type(component)
         for kind, layout, column in ((State, trace.states, xs), (Held, trace.held, hs)):
             for declared in cls.declared(kind):
-                yield _variable(f"{name}.{declared.name}", component.quantity(declared.quantity), layout, declared.name, functools.partial(_itself, column))
+                yield _variable(
+                    f"{name}.{declared.name}",
+                    component.quantity(declared.quantity),
+                    layout,
+                    declared.name,
+                    functools.partial(_itself, column),
+                )
         for declared in cls.declared(Observable):
             yield _variable(
                 f"{name}.{declared.name}", component.quantity(declared.quantity), trace.observables, declared.name,
@@ -497,7 +532,11 @@ class _Assembly:
                 (trace.inputs, functools.partial(self.inputs.__getitem__, name), port.inputs()),
             ):
                 for variable, quantity in pairs:
-                    shown = f"{name}.{port.name}" if port.domain is SIGNAL else f"{name}.{port.name}.{variable.removesuffix('_' + port.name)}"
+                    shown = (
+                        f"{name}.{port.name}"
+                        if port.domain is SIGNAL
+                        else f"{name}.{port.name}.{variable.removesuffix('_' + port.name)}"
+                    )
                     yield _variable(shown, component.quantity(quantity), layout, variable, values)
 
     def observe(self, name: str) -> ca.SX:
@@ -579,7 +618,10 @@ class _Assembly:
         for name, component in self.plan.components.items():
             for declared in type(component).declared(Observable):
                 if declared.stored:
-                    found[name] = (functools.partial(self.content, name, declared.name), functools.partial(self.flows, name))
+                    found[name] = (
+                        functools.partial(self.content, name, declared.name),
+                        functools.partial(self.flows, name),
+                    )
         return found
 
     def content(self, name: str, observable: str) -> ca.SX:
@@ -592,7 +634,9 @@ class _Assembly:
         for port in type(component).ports():
             if port.domain is not HYDRAULIC or port.role == "reads":
                 continue
-            layout, column = (trace.inputs, self.inputs[name]) if port.role == "gives" else (trace.outputs, self.output_column(name))
+            layout, column = (
+                (trace.inputs, self.inputs[name]) if port.role == "gives" else (trace.outputs, self.output_column(name))
+            )
             for k in layout.indices(f"q_{port.name}"):
                 total, size = total + column[k], size + ca.fabs(column[k]) / 2
         return total, size

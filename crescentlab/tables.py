@@ -106,7 +106,9 @@ def _curve(xs: list[float], ys: list[float], x: Quantity, y: Quantity) -> Curve:
         raise InputError(f"{len(xs)} points; a curve may have {MAX_POINTS}, so thin it out")
     for k, (first, second) in enumerate(zip(xs[:-1], xs[1:], strict=True)):
         if not second > first:
-            raise InputError(f"x must rise from point to point, but point {k + 2} is {second:g} after {first:g} (SI); sort the rows")
+            raise InputError(
+                f"x must rise from point to point, but point {k + 2} is {second:g} after {first:g} (SI); sort the rows"
+            )
     return Curve(x=tuple(xs), y=tuple(ys), x_quantity=x.name, y_quantity=y.name)
 
 
@@ -115,11 +117,16 @@ def read_csv(path: Path, x: Quantity | None = None, y: Quantity | None = None) -
     try:
         rows = list(csv.reader(path.read_text(encoding="utf-8-sig").splitlines()))
     except OSError as error:
-        raise InputError(f"cannot read the table {path.name}: {error.strerror}; it is looked for beside the circuit file") from None
+        raise InputError(
+            f"cannot read the table {path.name}: {error.strerror}; it is looked for beside the circuit file"
+        ) from None
     except UnicodeDecodeError:
         raise InputError(f"the table {path.name} is not text in UTF-8") from None
     if not rows or len(rows[0]) != 2:
-        raise InputError("the first line must name two columns with units, for example: pressure [bar], deflection [mm]", Place(str(path), 1))
+        raise InputError(
+            "the first line must name two columns with units, for example: pressure [bar], deflection [mm]",
+            Place(str(path), 1),
+        )
     columns = [_header(title, quantity, path) for title, quantity in zip(rows[0], (x, y), strict=True)]
     values: tuple[list[float], list[float]] = ([], [])
     for number, row in enumerate(rows[1:], start=2):
@@ -152,4 +159,7 @@ def _header(title: str, quantity: Quantity | None, path: Path) -> tuple[Quantity
     for candidate in QUANTITIES.values():
         if key in candidate.units:
             return candidate, unit
-    raise InputError(f"column {name.strip()!r}: unknown unit {unit!r}; write it in brackets, for example {name.strip()} [bar]", Place(str(path), 1))
+    raise InputError(
+        f"column {name.strip()!r}: unknown unit {unit!r}; write it in brackets, for example {name.strip()} [bar]",
+        Place(str(path), 1),
+    )

@@ -159,7 +159,11 @@ class _Bits:
         difference = relation.lhs - relation.rhs
         for known, symbol in zip(self.relations, self.symbols, strict=True):
             same = known.lhs - known.rhs
-            if known.operator == relation.operator and same.shape == difference.shape and ca.is_equal(same.sx, difference.sx, 8):
+            if (
+                known.operator == relation.operator
+                and same.shape == difference.shape
+                and ca.is_equal(same.sx, difference.sx, 8)
+            ):
                 return symbol
         n = relation.shape[0] if relation.shape else 1
         symbol = ca.SX.sym(f"b{len(self.symbols)}", n)
@@ -202,11 +206,18 @@ class _Tracing:
         self.parameters = numeric_fields(cls, component)
         self.fluid_names = fluids_asked(cls)
         self.t = ca.SX.sym("t")
-        self.x, self.h, self.u = (ca.SX.sym(n, lay.size) for n, lay in (("x", self.states), ("h", self.held), ("u", self.inputs)))
+        self.x, self.h, self.u = (
+            ca.SX.sym(n, lay.size) for n, lay in (("x", self.states), ("h", self.held), ("u", self.inputs))
+        )
         self.p = ca.SX.sym("p", len(self.parameters))
         fluid_fields = [numeric_fields(type(fluids[n]), fluids[n]) for n in self.fluid_names]
         self.pf = ca.SX.sym("pf", sum(len(f) for f in fluid_fields))
-        self.known: dict[str, Any] = {**self.states.cut(self.x), **self.held.cut(self.h), **self.inputs.cut(self.u), "t": Sym(self.t)}
+        self.known: dict[str, Any] = {
+            **self.states.cut(self.x),
+            **self.held.cut(self.h),
+            **self.inputs.cut(self.u),
+            "t": Sym(self.t),
+        }
         at = 0
         for name, fields in zip(self.fluid_names, fluid_fields, strict=True):
             symbols = {f: Sym(self.pf[at + k]) for k, f in enumerate(fields)}
@@ -224,7 +235,10 @@ class _Tracing:
         try:
             returned = self.symbolic.equations(**{n: self.known[n] for n in self.cls.asks_for()})
             check_returned(self.cls, returned)
-            self.conditions = [self.lowered(e.condition, bits) if isinstance(e, (Event, Failure)) else ca.SX(0) for e in returned.values()]
+            self.conditions = [
+                self.lowered(e.condition, bits) if isinstance(e, (Event, Failure)) else ca.SX(0)
+                for e in returned.values()
+            ]
         except ComponentError:
             raise
         except Exception as error:  # the author's slip, told in the author's words
@@ -238,7 +252,9 @@ class _Tracing:
         if made.shape != ():
             raise self.fail("an event's condition must be a scalar; combine a vector's elements first")
         for part in parts(made):
-            if isinstance(part, Equality) and any(ca.which_depends(part.lhs.sx - part.rhs.sx, ca.vertcat(self.x, self.t), 1, True)):
+            if isinstance(part, Equality) and any(
+                ca.which_depends(part.lhs.sx - part.rhs.sx, ca.vertcat(self.x, self.t), 1, True)
+            ):
                 raise self.fail("== compares a continuous value, which never meets exactly; use <, <=, > or >=")
         return made.lower(bits.bit)
 
@@ -250,11 +266,21 @@ class _Tracing:
         function = functools.partial(self.function, arguments)
         relations = [Sym.of(r.lhs - r.rhs if r.operator[0] == ">" else r.rhs - r.lhs).sx for r in bits.relations]
         scales = [Sym.of(abs(r.lhs) + abs(r.rhs)).sx for r in bits.relations]
-        infos = [RelationInfo(_text(r), "=" not in r.operator) for r in bits.relations for _ in range(r.shape[0] if r.shape else 1)]
+        infos = [
+            RelationInfo(_text(r), "=" not in r.operator)
+            for r in bits.relations
+            for _ in range(r.shape[0] if r.shape else 1)
+        ]
         events, conditions, periods = self.events(returned, function)
-        derivative = self.column({k.removeprefix("der_"): v for k, v in returned.items() if k.startswith("der_")}, self.states)
+        derivative = self.column(
+            {k.removeprefix("der_"): v for k, v in returned.items() if k.startswith("der_")}, self.states
+        )
         observable = self.column(returned, self.observables)
-        clock = _time_only(ca.vertcat(derivative, y, *relations), self.t, ca.vertcat(self.x, self.h, b, self.u)) if "t" in self.cls.asks_for() else ca.SX(0, 1)
+        clock = (
+            _time_only(ca.vertcat(derivative, y, *relations), self.t, ca.vertcat(self.x, self.h, b, self.u))
+            if "t" in self.cls.asks_for()
+            else ca.SX(0, 1)
+        )
         return Trace(
             self.cls, self.states, self.held, self.inputs, self.outputs, self.observables, self.parameters, self.fluid_names,
             tuple(self.groups(y, function)), function("der", derivative), function("obs", observable), tuple(infos),
@@ -300,16 +326,22 @@ class _Tracing:
         for (name, value), condition in zip(returned.items(), self.conditions, strict=True):
             if isinstance(value, Failure):
                 names = tuple(n for n in self.observables.offsets if f"{{{n}}}" in value.message)
-                infos.append(EventInfo(name, "fail", condition=len(conditions), message=value.message, message_names=names))
+                infos.append(
+                    EventInfo(name, "fail", condition=len(conditions), message=value.message, message_names=names)
+                )
                 conditions.append(condition)
             elif isinstance(value, Event):
-                infos.append(EventInfo(name, "when", condition=len(conditions), remap=function("remap", self.remap(value.then))))
+                infos.append(
+                    EventInfo(name, "when", condition=len(conditions), remap=function("remap", self.remap(value.then)))
+                )
                 conditions.append(condition)
             elif isinstance(value, Tick):
                 period = Sym.of(value.dt).sx
                 if any(ca.which_depends(period, ca.vertcat(self.t, self.x, self.h, self.u), 1, True)):
                     raise self.fail(f"the period of {name} must depend on parameters only")
-                infos.append(EventInfo(name, "every", period=len(periods), remap=function("remap", self.remap(value.then))))
+                infos.append(
+                    EventInfo(name, "every", period=len(periods), remap=function("remap", self.remap(value.then)))
+                )
                 periods.append(period)
         return infos, conditions, periods
 
@@ -360,11 +392,15 @@ def _time_only(value: ca.SX, t: ca.SX, others: ca.SX) -> ca.SX:
                 found += [expressions[i] for i in ins if work[i] == 1]
             elif mark == 1:
                 values = [expressions[i] for i in ins]
-                expressions[outs[0]] = ca.SX.unary(op, values[0]) if len(values) == 1 else ca.SX.binary(op, values[0], values[1])
+                expressions[outs[0]] = (
+                    ca.SX.unary(op, values[0]) if len(values) == 1 else ca.SX.binary(op, values[0], values[1])
+                )
             work[outs[0]] = mark
             if mark == 0:
                 values = [expressions.get(i, ca.SX(0)) for i in ins]
-                expressions[outs[0]] = ca.SX.unary(op, values[0]) if len(values) == 1 else ca.SX.binary(op, values[0], values[1])
+                expressions[outs[0]] = (
+                    ca.SX.unary(op, values[0]) if len(values) == 1 else ca.SX.binary(op, values[0], values[1])
+                )
     return _cat(found)
 
 

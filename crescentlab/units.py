@@ -163,7 +163,9 @@ displacement = _quantity("displacement", "m^3/rad", (0, 3, 0, 0), 1e-6, _DISPLAC
 length = _quantity("length", "m", (0, 1, 0, 0), 1e-3, _LENGTH_UNITS)
 area = _quantity("area", "m^2", (0, 2, 0, 0), 1e-6, _AREA_UNITS)
 time = _quantity("time", "s", (0, 0, 1, 0), 1.0, _TIME_UNITS)
-frequency = _quantity("frequency", "Hz", (0, 0, -1, 0), 1.0, {"Hz": 1.0, "kHz": 1e3, "MHz": 1e6, "mHz": 1e-3, **_PER_TIME})
+frequency = _quantity(
+    "frequency", "Hz", (0, 0, -1, 0), 1.0, {"Hz": 1.0, "kHz": 1e3, "MHz": 1e6, "mHz": 1e-3, **_PER_TIME}
+)
 angle = _quantity("angle", "rad", NO_DIMS, 1.0, _ANGLE_UNITS)
 speed = _quantity(
     "speed", "rad/s", (0, 0, -1, 0), 1.0,
@@ -176,19 +178,29 @@ velocity = _quantity(
 )  # fmt: skip
 acceleration = _quantity("acceleration", "m/s^2", (0, 1, -2, 0), 1.0, {"m/s2": 1.0, "mm/s2": 1e-3})
 mass = _quantity("mass", "kg", (1, 0, 0, 0), 1.0, {"kg": 1.0, "g": 1e-3, "mg": 1e-6, "t": 1e3})
-inertia = _quantity("inertia", "kg m^2", (1, 2, 0, 0), 1e-3, {"kg m2": 1.0, "kg cm2": 1e-4, "g mm2": 1e-9, "kg mm2": 1e-6})
+inertia = _quantity(
+    "inertia", "kg m^2", (1, 2, 0, 0), 1e-3, {"kg m2": 1.0, "kg cm2": 1e-4, "g mm2": 1e-9, "kg mm2": 1e-6}
+)
 force = _quantity("force", "N", (1, 1, -2, 0), 1.0, _FORCE_UNITS)
 torque = _quantity("torque", "N m", (1, 2, -2, 0), 1.0, _TORQUE_UNITS)
-energy = _quantity("energy", "J", (1, 2, -2, 0), 1.0, {"J": 1.0, "kJ": 1e3, "MJ": 1e6, "mJ": 1e-3, "Wh": 3600.0, "kWh": 3.6e6})
-power = _quantity("power", "W", (1, 2, -3, 0), 1.0, {"W": 1.0, "kW": 1e3, "MW": 1e6, "mW": 1e-3, "hp": 745.6998715822702})
-density = _quantity("density", "kg/m^3", (1, -3, 0, 0), 1e3, {"kg/m3": 1.0, "g/cm3": 1e3, "kg/L": 1e3, "kg/l": 1e3, "kg/dm3": 1e3})
+energy = _quantity(
+    "energy", "J", (1, 2, -2, 0), 1.0, {"J": 1.0, "kJ": 1e3, "MJ": 1e6, "mJ": 1e-3, "Wh": 3600.0, "kWh": 3.6e6}
+)
+power = _quantity(
+    "power", "W", (1, 2, -3, 0), 1.0, {"W": 1.0, "kW": 1e3, "MW": 1e6, "mW": 1e-3, "hp": 745.6998715822702}
+)
+density = _quantity(
+    "density", "kg/m^3", (1, -3, 0, 0), 1e3, {"kg/m3": 1.0, "g/cm3": 1e3, "kg/L": 1e3, "kg/l": 1e3, "kg/dm3": 1e3}
+)
 kinematic_viscosity = _quantity(
     "kinematic_viscosity", "m^2/s", (0, 2, -1, 0), 1e-6, {"cSt": 1e-6, "m2/s": 1.0, "mm2/s": 1e-6, "St": 1e-4}
 )
 dynamic_viscosity = _quantity(
     "dynamic_viscosity", "Pa s", (1, -1, -1, 0), 1e-3, {"mPa s": 1e-3, "Pa s": 1.0, "cP": 1e-3, "P": 0.1, "N s/m2": 1.0}
 )
-temperature = _quantity("temperature", "K", (0, 0, 0, 1), 1.0, {"degC": 1.0, "K": 1.0, "°C": 1.0}, **{"degC": 273.15, "°C": 273.15})
+temperature = _quantity(
+    "temperature", "K", (0, 0, 0, 1), 1.0, {"degC": 1.0, "K": 1.0, "°C": 1.0}, **{"degC": 273.15, "°C": 273.15}
+)
 stiffness = _quantity(
     "stiffness", "N/m", (1, 0, -2, 0), 1e3, {"N/mm": 1e3, "N/m": 1.0, "kN/m": 1e3, "N/um": 1e6, "kN/mm": 1e6}
 )
@@ -196,7 +208,9 @@ damping = _quantity(
     "damping", "N s/m", (1, 0, -1, 0), 1.0,
     {"N s/m": 1.0, "Ns/m": 1.0, "N/(m/s)": 1.0, "N s/mm": 1e3, "kN s/m": 1e3, "N/(mm/s)": 1e3, "kg/s": 1.0},
 )  # fmt: skip
-rotary_stiffness = _quantity("rotary_stiffness", "N m/rad", (1, 2, -2, 0), 1.0, {"N m/rad": 1.0, "Nm/rad": 1.0, "Nm/deg": 180 / math.pi})
+rotary_stiffness = _quantity(
+    "rotary_stiffness", "N m/rad", (1, 2, -2, 0), 1.0, {"N m/rad": 1.0, "Nm/rad": 1.0, "Nm/deg": 180 / math.pi}
+)
 rotary_damping = _quantity(
     "rotary_damping", "N m s/rad", (1, 2, -1, 0), 1.0,
     {"N m s/rad": 1.0, "Nms/rad": 1.0, "N m s": 1.0, "Nm s": 1.0, "Nm/(rad/s)": 1.0, "Nm/rpm": 1 / _RPM},
@@ -296,7 +310,11 @@ def si_unit(dims: Dims) -> str:
     for candidate in QUANTITIES.values():
         if candidate.dims == dims:
             return candidate.si
-    parts = [f"{base}^{power}" if power != 1 else base for base, power in zip(("kg", "m", "s", "K"), dims, strict=True) if power]
+    parts = [
+        f"{base}^{power}" if power != 1 else base
+        for base, power in zip(("kg", "m", "s", "K"), dims, strict=True)
+        if power
+    ]
     return " ".join(parts) or "1"
 
 

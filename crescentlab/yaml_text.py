@@ -75,7 +75,10 @@ def read(path: Path, shown: str | None = None) -> Node:
     try:
         size = path.stat().st_size
         if size > MAX_BYTES:
-            raise InputError(f"the file has {size} bytes; a circuit file may have {MAX_BYTES}, so split it into subcircuits", Place(name, 1))
+            raise InputError(
+                f"the file has {size} bytes; a circuit file may have {MAX_BYTES}, so split it into subcircuits",
+                Place(name, 1),
+            )
         text = path.read_text(encoding="utf-8-sig")
     except IsADirectoryError:
         raise InputError("this is a folder; name a circuit file in it", Place(name, 1)) from None
@@ -145,7 +148,9 @@ class _Builder:
                 self.add(Node(event.value, self.place(event)), event.anchor, event)
             elif isinstance(event, yaml.AliasEvent):
                 if event.anchor not in self.anchors:
-                    raise InputError(f"the alias *{event.anchor} refers to nothing complete before it", self.place(event))
+                    raise InputError(
+                        f"the alias *{event.anchor} refers to nothing complete before it", self.place(event)
+                    )
                 self.add(self.anchors[event.anchor], None, event)
             elif isinstance(event, (yaml.MappingStartEvent, yaml.SequenceStartEvent)):
                 if len(self.stack) >= MAX_DEPTH:
@@ -179,7 +184,12 @@ class _Builder:
             return
         else:
             assert isinstance(parent.value, dict)
-            if node.value == "" and isinstance(event, yaml.ScalarEvent) and not event.style and (")" in key or "]" in key):
+            if (
+                node.value == ""
+                and isinstance(event, yaml.ScalarEvent)
+                and not event.style
+                and (")" in key or "]" in key)
+            ):
                 self.slip(event)
             parent.value[key] = node
             self.stack[-1] = (parent, parent_anchor, None)
@@ -190,7 +200,10 @@ class _Builder:
             raise InputError(_explain("a key must be a word", self.lines, self.place(event).line), self.place(event))
         if node.value in parent.keys:
             first = parent.keys[node.value]
-            raise InputError(f"the key {node.value!r} stands twice (first in line {first.line if first else '?'}); remove one", node.place)
+            raise InputError(
+                f"the key {node.value!r} stands twice (first in line {first.line if first else '?'}); remove one",
+                node.place,
+            )
         parent.keys[node.value] = node.place
         return node.value
 

@@ -35,7 +35,9 @@ def run(options: argparse.Namespace) -> int:
 def facts(plan: Plan) -> dict[str, Any]:
     """What ``--json`` prints."""
     netlist = plan.design.netlist
-    events = [{"name": f"{name}.{event.name}", "kind": event.kind} for name, tr in plan.traces.items() for event in tr.events]
+    events = [
+        {"name": f"{name}.{event.name}", "kind": event.kind} for name, tr in plan.traces.items() for event in tr.events
+    ]
     if netlist.sections.simulation.stop_when:
         events.append({"name": "stop_when", "kind": "stop"})
     return {
@@ -91,7 +93,9 @@ def told(plan: Plan, found: dict[str, Any]) -> str:
     kinds = Counter(e["kind"] for e in found["events"])
     words = {"when": "event", "every": "tick", "fail": "limit", "stop": "stop condition"}
     events = [counted(kinds[kind], word) for kind, word in words.items() if kinds[kind]] or ["no events"]
-    fluids = ", ".join(sorted(set(found["fluids"].values()))) or ("named by the circuit around it" if plan.design.netlist.sections.ports else "none")
+    fluids = ", ".join(sorted(set(found["fluids"].values()))) or (
+        "named by the circuit around it" if plan.design.netlist.sections.ports else "none"
+    )
     lines = [
         found["title"],
         "",
@@ -162,7 +166,12 @@ def _merged(plan: Plan, nets: list[Net]) -> tuple[str, str, str, str]:
         found = {k: _spanned(v, span) for k, v in found.items()}
     given = found["given_by"] or f"open: {', '.join(found['open'])}"
     taken = [*found["taken_by"], *[f"{m} (reads)" for m in found["read_by"]]]
-    return (first.source.name + ("" if len(nets) == 1 else span), first.domain.name, given, ", ".join(_counted_elements(taken)) or "nothing")
+    return (
+        first.source.name + ("" if len(nets) == 1 else span),
+        first.domain.name,
+        given,
+        ", ".join(_counted_elements(taken)) or "nothing",
+    )
 
 
 def _spanned(value: Any, span: str) -> Any:
@@ -176,5 +185,7 @@ def _counted_elements(members: list[str]) -> list[str]:
     shown: list[str] = []
     for base, group in groupby(members, key=lambda m: m.partition("[")[0] if m.endswith("]") else m):
         each = list(group)
-        shown.append(each[0] if len(each) == 1 else f"{base}[{each[0].rpartition('[')[2][:-1]}..{each[-1].rpartition('[')[2]}")
+        shown.append(
+            each[0] if len(each) == 1 else f"{base}[{each[0].rpartition('[')[2][:-1]}..{each[-1].rpartition('[')[2]}"
+        )
     return shown

@@ -107,7 +107,11 @@ def _size(size: Size | None) -> str:
 
 
 def _parameters(cls: type[Component] | type[Fluid]) -> list[tuple[str, ...]]:
-    own = [n for n in cls.model_fields if n not in Fluid.model_fields] if issubclass(cls, Fluid) else list(cls.model_fields)
+    own = (
+        [n for n in cls.model_fields if n not in Fluid.model_fields]
+        if issubclass(cls, Fluid)
+        else list(cls.model_fields)
+    )
     names = own + [n for n in cls.model_fields if n not in own]
     fields = [(name, cls.model_fields[name]) for name in names]
     return [(f.alias or n, kind(f), default(f), bounds(f), f.description or "") for n, f in fields]
@@ -117,7 +121,9 @@ def kind(field: FieldInfo) -> str:
     """What a parameter is: a quantity with its unit, a choice of words, a whole number, a curve."""
     quantity = field_quantity(field)
     if quantity is not None:
-        return ("list of " if "list" in str(field.annotation) or "tuple" in str(field.annotation) else "") + _quantity(quantity)
+        return ("list of " if "list" in str(field.annotation) or "tuple" in str(field.annotation) else "") + _quantity(
+            quantity
+        )
     return " or ".join(_words(field.annotation))
 
 
@@ -162,5 +168,7 @@ def bounds(field: FieldInfo) -> str:
     for sign, name in ((">", "gt"), (">=", "ge"), ("<", "lt"), ("<=", "le")):
         limit = next((getattr(m, name) for m in field.metadata if getattr(m, name, None) is not None), None)
         if limit is not None:
-            found.append(f"{sign} {shown(float(limit), quantity) if quantity is not None and limit else format(limit, 'g')}")
+            found.append(
+                f"{sign} {shown(float(limit), quantity) if quantity is not None and limit else format(limit, 'g')}"
+            )
     return ", ".join(found)

@@ -27,16 +27,27 @@ def run(options: argparse.Namespace) -> int:
 
 def schema(library: Library) -> dict[str, Any]:
     """The schema: circuit sections from the netlist's model, components by their type."""
-    made: dict[str, Any] = {"$schema": "https://json-schema.org/draft/2020-12/schema", **_loosened(CircuitFile.model_json_schema())}
+    made: dict[str, Any] = {
+        "$schema": "https://json-schema.org/draft/2020-12/schema",
+        **_loosened(CircuitFile.model_json_schema()),
+    }
     made["title"] = "crescentlab circuit"
     made["properties"]["crescentlab"] = {"enum": [1, "1"], "description": "format version"}
     definitions = made["$defs"]
-    definitions["ComponentSection"] = _section("type", library.components, "a component type, or the file of a subcircuit", library)
+    definitions["ComponentSection"] = _section(
+        "type", library.components, "a component type, or the file of a subcircuit", library
+    )
     definitions["FluidSection"] = _section("type", library.fluids, "a fluid type", library)
     fluid = {"$ref": "#/$defs/FluidSection"}
     made["properties"]["fluid"] = {**fluid, "description": "the one fluid"}
-    made["properties"]["fluids"] = {"type": "object", "additionalProperties": fluid, "description": "several fluids by name; nets choose"}
-    known = {"anyOf": [{"enum": [name for name in listed(library) if name in library.components]}, {"pattern": r"\.ya?ml$"}]}
+    made["properties"]["fluids"] = {
+        "type": "object",
+        "additionalProperties": fluid,
+        "description": "several fluids by name; nets choose",
+    }
+    known = {
+        "anyOf": [{"enum": [name for name in listed(library) if name in library.components]}, {"pattern": r"\.ya?ml$"}]
+    }
     made["if"] = {"not": {"required": ["library"]}}  # without components of the user's own, every type is known
     made["then"] = {"properties": {"components": {"additionalProperties": {"properties": {"type": known}}}}}
     return made
@@ -63,7 +74,8 @@ def _section(key: str, classes: dict[str, Any], description: str, library: Libra
         "required": [key],
         "properties": {key: {"description": description, "anyOf": [*choices, {"type": "string"}]}},
         "allOf": [
-            {"if": {"properties": {key: {"const": name}}, "required": [key]}, "then": _type(name, cls)} for name, cls in known.items()
+            {"if": {"properties": {key: {"const": name}}, "required": [key]}, "then": _type(name, cls)}
+            for name, cls in known.items()
         ],
     }
 
@@ -89,7 +101,10 @@ def _type(name: str, cls: type[Component] | type[Fluid]) -> dict[str, Any]:
 def _parameter(field: FieldInfo) -> dict[str, Any]:
     """One parameter: its kind, range and default in words; expressions are text, so any scalar is allowed."""
     said = [field.description or "", kind(field), bounds(field)]
-    made: dict[str, Any] = {"description": "; ".join(text for text in said if text), "type": [*SCALAR, "array", "object"]}
+    made: dict[str, Any] = {
+        "description": "; ".join(text for text in said if text),
+        "type": [*SCALAR, "array", "object"],
+    }
     quantity = field_quantity(field)
     if quantity is not None:
         made["examples"] = [quantity.example()]

@@ -42,7 +42,9 @@ def run(options: argparse.Namespace) -> int:
     if target is not None:
         result.write(target, options.record)
         log.info("wrote %s", target)
-    pictures = plotting.write_plots(result, (target or Path(circuit.netlist.name)).with_suffix("")) if options.plot else []
+    pictures = (
+        plotting.write_plots(result, (target or Path(circuit.netlist.name)).with_suffix("")) if options.plot else []
+    )
     if options.json:
         print(json.dumps(_finite(report(result, target)), indent=2))
     elif not options.quiet:
@@ -78,7 +80,9 @@ def _progress(quiet: bool) -> Iterator[Callable[[float], None] | None]:
         return
     from tqdm import tqdm
 
-    with tqdm(total=1.0, bar_format="{percentage:3.0f} %|{bar}| {elapsed} < {remaining}", leave=False, file=sys.stderr) as bar:
+    with tqdm(
+        total=1.0, bar_format="{percentage:3.0f} %|{bar}| {elapsed} < {remaining}", leave=False, file=sys.stderr
+    ) as bar:
 
         def show(share: float) -> None:
             bar.n = min(share, 1.0)
@@ -114,11 +118,19 @@ def summary(result: Result, target: Path | None, record: list[str], pictures: li
     t, s = result.trajectory, result.trajectory.statistics
     time = QUANTITIES["time"]
     end = time.show(t.steps.t[-1], result.display_unit(time))
-    work = [counted(s.steps, "step"), counted(s.evaluations, "evaluation"), counted(s.jacobians, "Jacobian"), counted(s.restarts, "restart")]
+    work = [
+        counted(s.steps, "step"),
+        counted(s.evaluations, "evaluation"),
+        counted(s.jacobians, "Jacobian"),
+        counted(s.restarts, "restart"),
+    ]
     rows = [
         ("end", end if t.status == "done" else f"{end}, {t.status}"),
         ("solver", f"{t.solver}: {', '.join(work)} in {s.wall_s:.3g} s"),
-        ("model", f"{counted(len(result.system.state_names), 'state')}; {counted(s.events, 'event')}, {counted(s.ticks, 'tick')}"),
+        (
+            "model",
+            f"{counted(len(result.system.state_names), 'state')}; {counted(s.events, 'event')}, {counted(s.ticks, 'tick')}",
+        ),
     ]
     if result.balance is not None:
         worst = max(result.balance.components.items(), key=lambda item: item[1])
@@ -129,7 +141,10 @@ def summary(result: Result, target: Path | None, record: list[str], pictures: li
     parts = [result.title, table(rows, indent="  ")]
     if figures := _figures(result):
         more = len(result.net_pressures()) - MAX_NETS
-        parts.append(table(figures, right=(2, 3, 4, 5), indent="  ") + (f"\n  and {counted(more, 'net')} more" if more > 0 else ""))
+        parts.append(
+            table(figures, right=(2, 3, 4, 5), indent="  ")
+            + (f"\n  and {counted(more, 'net')} more" if more > 0 else "")
+        )
     parts += [f"  warning: {warning}" for warning in t.warnings]
     written = [f"  wrote {path}" for path in pictures]
     if target is not None:

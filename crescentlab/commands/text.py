@@ -31,7 +31,9 @@ def table(rows: Iterable[Sequence[str]], *, right: Sequence[int] = (), indent: s
     widths = [max(len(cell) for cell in column) for column in zip(*cells, strict=True)]
     lines: list[str] = []
     for row in cells:
-        shown = [cell.rjust(w) if k in right else cell.ljust(w) for k, (cell, w) in enumerate(zip(row, widths, strict=True))]
+        shown = [
+            cell.rjust(w) if k in right else cell.ljust(w) for k, (cell, w) in enumerate(zip(row, widths, strict=True))
+        ]
         if fold:
             lines.append(wrapped(indent + "".join(f"{cell}  " for cell in shown[:-1]), row[-1]))
         else:
@@ -42,7 +44,9 @@ def table(rows: Iterable[Sequence[str]], *, right: Sequence[int] = (), indent: s
 def wrapped(first: str, text: str) -> str:
     """``text`` after ``first``, folded to the terminal with later lines set in under it."""
     width = max(min(shutil.get_terminal_size((110, 24)).columns, 130), len(first) + 40)
-    folded = textwrap.fill(text, width, initial_indent=first, subsequent_indent=" " * len(first), break_on_hyphens=False)
+    folded = textwrap.fill(
+        text, width, initial_indent=first, subsequent_indent=" " * len(first), break_on_hyphens=False
+    )
     return folded.replace("\N{NO-BREAK SPACE}", " ") if text else first.rstrip()
 
 

@@ -148,9 +148,11 @@ class Hybrid:
             event = self.system.events[k]
             if event.kind == "fail":
                 names = event.message_names
-                values: np.ndarray | list[float] = np.array(self.system.function_of(names)(t, x, self.h, self.b, self.p)).ravel() if names else []
+                values: np.ndarray | list[float] = (
+                    np.array(self.system.function_of(names)(t, x, self.h, self.b, self.p)).ravel() if names else []
+                )
                 shown = {
-                    n.rpartition(".")[2]: q.show(float(v), DISPLAY.get(q.name))
+                    n.rpartition(".")[2]: q.show(float(v), DISPLAY.get(q.name, "" if q.si == "1" else None))
                     for n, v in zip(names, values, strict=True)
                     for q in [self.system.find(n).quantity]
                 }
@@ -215,13 +217,17 @@ class Hybrid:
         """Roots in [start, end] of relations that curve in time, found on a fine grid and then closed in on."""
         times = np.linspace(start, end, SCAN_POINTS)
         prepared = self.system.relation
-        columns = prepared.function(times.reshape(1, -1), x, self.h, self.b, np.zeros(x.size), prepared.parameters(self.p))
+        columns = prepared.function(
+            times.reshape(1, -1), x, self.h, self.b, np.zeros(x.size), prepared.parameters(self.p)
+        )
         g, rate = np.array(columns[0])[self.curved], np.array(columns[1])[self.curved]
         found: list[float] = []
         for row, k in enumerate(self.curved):
             for j in np.flatnonzero(np.sign(g[row, 1:]) != np.sign(g[row, :-1])):
                 found.append(self.close_in(int(k), float(times[j]), float(times[j + 1]), x))
-            dips = (g[row, 1:] * g[row, :-1] > 0) & (rate[row, :-1] * g[row, :-1] < 0) & (rate[row, 1:] * g[row, 1:] > 0)
+            dips = (
+                (g[row, 1:] * g[row, :-1] > 0) & (rate[row, :-1] * g[row, :-1] < 0) & (rate[row, 1:] * g[row, 1:] > 0)
+            )
             for j in np.flatnonzero(dips):
                 found += self.dip(int(k), float(times[j]), float(times[j + 1]), x)
         return sorted(found)
@@ -261,4 +267,3 @@ class Hybrid:
             else:
                 b = middle
         return []
-

@@ -42,13 +42,17 @@ class Options:
     output_step: float | None = None
 
 
-def integrate(system: System, values: Values, options: Options, progress: Callable[[float], None] | None = None) -> Trajectory:
+def integrate(
+    system: System, values: Values, options: Options, progress: Callable[[float], None] | None = None
+) -> Trajectory:
     """Run the system; failures and interruptions end up in the trajectory's status, nothing is lost."""
     return _Run(system, values, options, progress).run()
 
 
 class _Run:
-    def __init__(self, system: System, values: Values, options: Options, progress: Callable[[float], None] | None) -> None:
+    def __init__(
+        self, system: System, values: Values, options: Options, progress: Callable[[float], None] | None
+    ) -> None:
         self.system, self.values, self.options, self.progress = system, values, options, progress
         self.functions = Functions(system, values)
         self.hybrid = Hybrid(system, values, options.start, options.stop)
@@ -109,7 +113,17 @@ class _Run:
         if self.grid is not None and not self.grid.t:
             self.grid.add(self.steps.t[0], self.steps.x[0], self.steps.h[0], self.steps.b[0])
         layout = "" if not self.functions.n else f" ({self.stepper.name})"
-        return Trajectory(self.steps, self.grid, self.happenings, s, self.options.solver + layout, self.pieces, status, error, self.warnings)
+        return Trajectory(
+            self.steps,
+            self.grid,
+            self.happenings,
+            s,
+            self.options.solver + layout,
+            self.pieces,
+            status,
+            error,
+            self.warnings,
+        )
 
     def now(self) -> float:
         return self.steps.t[-1] if self.steps.t else self.options.start
@@ -265,7 +279,9 @@ class _Run:
             return
         assert self.options.output_step is not None
         path = None
-        while (t := self.options.start + self.grid_count * self.options.output_step) < high - self.hybrid.time_tolerance:
+        while (
+            t := self.options.start + self.grid_count * self.options.output_step
+        ) < high - self.hybrid.time_tolerance:
             if t >= low - self.hybrid.time_tolerance:
                 path = path or self.stepper.interpolant()
                 inside = min(max(t, low), high)
@@ -311,9 +327,15 @@ class _Run:
         """The state whose rate changes fastest against its tolerance."""
         f = self.functions.rhs(t, x)
         pattern = self.functions.pattern
-        matrix = sparse.csc_matrix((self.functions.nonzeros(t, x), pattern.indices, pattern.indptr), shape=pattern.shape)
+        matrix = sparse.csc_matrix(
+            (self.functions.nonzeros(t, x), pattern.indices, pattern.indptr), shape=pattern.shape
+        )
         change = np.abs(matrix @ f) / (self.atol + self.options.rtol * np.abs(x))
-        name = self.system.state_names[int(np.nanargmax(change))] if change.size and np.isfinite(change).any() else "unknown"
+        name = (
+            self.system.state_names[int(np.nanargmax(change))]
+            if change.size and np.isfinite(change).any()
+            else "unknown"
+        )
         return f"{name} limits it; try --solver bdf, a larger volume or mass there, or smoother signals"
 
 
@@ -326,7 +348,9 @@ class _PressureLimits:
         self.held = self.of(system.held_names, system.held_quantities)
         self.seen_h: np.ndarray | None = None
 
-    def of(self, names: list[str], quantities: list[units.Quantity]) -> tuple[np.ndarray, np.ndarray, list[str], list[bool]]:
+    def of(
+        self, names: list[str], quantities: list[units.Quantity]
+    ) -> tuple[np.ndarray, np.ndarray, list[str], list[bool]]:
         """Places, lowest possible values, names, and whether tension is allowed, of all fluid pressures."""
         plan = self.system.plan
         found = []
@@ -349,7 +373,15 @@ class _PressureLimits:
             warning = warning or self.look(t, h, *self.held)
         return warning
 
-    def look(self, t: float, vector: np.ndarray, places: np.ndarray, floors: np.ndarray, names: list[str], tension: list[bool]) -> str | None:
+    def look(
+        self,
+        t: float,
+        vector: np.ndarray,
+        places: np.ndarray,
+        floors: np.ndarray,
+        names: list[str],
+        tension: list[bool],
+    ) -> str | None:
         if not np.count_nonzero(vector < floors):
             return None
         k = int(np.flatnonzero(vector[places] < floors[places])[0])
@@ -358,7 +390,9 @@ class _PressureLimits:
             f"({units.pressure.show(floors[places[k]], 'bar')})"
         )
         if not tension[k]:
-            raise SimulationError(f"{said}; the oil would cavitate: feed this volume better, or write tension: true in the fluid to go on")
+            raise SimulationError(
+                f"{said}; the oil would cavitate: feed this volume better, or write tension: true in the fluid to go on"
+            )
         return said
 
 

@@ -69,7 +69,9 @@ class Pieces:
     h: list[np.ndarray] = field(default_factory=list)
     b: list[np.ndarray] = field(default_factory=list)
 
-    def add(self, low: float, high: float, path: Callable[[np.ndarray], np.ndarray], h: np.ndarray, b: np.ndarray) -> None:
+    def add(
+        self, low: float, high: float, path: Callable[[np.ndarray], np.ndarray], h: np.ndarray, b: np.ndarray
+    ) -> None:
         """Append the piece [low, high]; ``path(times)`` gives states, shape (times, n)."""
         self.low.append(low)
         self.high.append(high)
@@ -79,7 +81,12 @@ class Pieces:
 
     def at_nodes(self) -> np.ndarray:
         """States at the Gauss nodes of every piece, shape (pieces, 3, n)."""
-        return np.array([path(low + GAUSS_NODES * (high - low)) for path, low, high in zip(self.path, self.low, self.high, strict=True)])
+        return np.array(
+            [
+                path(low + GAUSS_NODES * (high - low))
+                for path, low, high in zip(self.path, self.low, self.high, strict=True)
+            ]
+        )
 
 
 @dataclass
