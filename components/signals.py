@@ -13,9 +13,9 @@ from crescentlab import units
 from crescentlab.component import Component, Equations
 from crescentlab.domain import gives_signal, held, takes_signal
 from crescentlab.errors import UnitError
-from crescentlab.maths import Expr, event_where, maximum, pi, sin, stack, total, when
+from crescentlab.maths import Expr, event_where, pi, sin, stack, total, when
 from crescentlab.tables import Curve, CurveOf
-from crescentlab.units import Angle, Flow, FlowResistance, Frequency, Pressure, QuadraticResistance, Ratio, Time
+from crescentlab.units import Angle, Frequency, Ratio, Time
 
 
 def _known(name: str) -> str:
@@ -323,24 +323,3 @@ class Product(Component):
 
     def equations(self, u1: Expr, u2: Expr) -> Equations:
         return {"y": u1 * u2}
-
-
-class BackPressure(Component):
-    r"""Pressure that a flow builds up, as in the spring chamber of a relief valve; zero for no or reverse flow.
-
-    .. math:: p = a q + b q^2 \ (q > 0), \quad p = 0 \ (q \le 0)
-
-    q = `u` [m^3/s]; a = `linear` [Pa s/m^3], b = `quadratic` [Pa s^2/m^6]. The branches meet at q = 0. Not for a
-    resistance in the line: the signal passes no flow. Source: Rundo & Corvaglia (2016), Fig. 14 (second-order
-    polynomial through CFD points).
-    """
-
-    linear: FlowResistance = Field(default=0.0, ge=0, description="pressure per flow")
-    quadratic: QuadraticResistance = Field(default=0.0, ge=0, description="pressure per flow squared")
-
-    u = takes_signal(Flow, "the flow")
-    y = gives_signal(Pressure, "the pressure")
-
-    def equations(self, u: Expr) -> Equations:
-        q = maximum(u, 0.0)
-        return {"y": self.linear * q + self.quadratic * q * q}

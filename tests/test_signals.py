@@ -5,7 +5,6 @@ import math
 import numpy as np
 import pytest
 from crescentlab.components.signals import (
-    BackPressure,
     Constant,
     Gain,
     Product,
@@ -130,10 +129,3 @@ def test_product_checks_dimensions():
     assert power.equations(u1=100 * BAR, u2=6 * LPM)["y"] == pytest.approx(1000.0)
     with pytest.raises(ValueError, match="pressure times flow is in W"):
         Product(first_quantity="pressure", second_quantity="flow", output_quantity="force")
-
-
-@pytest.mark.parametrize(("flow", "bar"), [(30, 0.414), (48, 0.97344), (0, 0.0), (-20, 0.0)])
-def test_back_pressure(flow, bar):
-    """a q + b q^2 with the spring chamber's 1.8e7 and 1.296e11: 0.414 bar at 30 L/min; nothing backwards."""
-    part = BackPressure(linear=1.8e7, quadratic=1.296e11)
-    assert part.equations(u=flow * LPM)["y"] == pytest.approx(bar * BAR, abs=1e-6)
