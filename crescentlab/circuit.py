@@ -99,9 +99,9 @@ class Circuit:
         return self._systems[key]
 
     def simulate(
-        self, stop: str | float | None = None, parameters: Mapping[str, str | float] | None = None, *, solver: str | None = None,
-        rtol: float | None = None, output_step: str | float | None = None, max_step: str | float | None = None,
-        progress: Callable[[float], None] | None = None, check: bool = True,
+        self, stop: str | float | None = None, parameters: Mapping[str, str | float] | None = None, *,
+        solver: str | None = None, rtol: float | None = None, output_step: str | float | None = None,
+        max_step: str | float | None = None, progress: Callable[[float], None] | None = None, check: bool = True,
     ) -> Result:  # fmt: skip
         """Integrate the circuit; text needs units, floats are SI.
 
@@ -112,8 +112,9 @@ class Circuit:
         system = self._assembled(design)
         section = self.netlist.sections.simulation
         options = Options(
-            stop=_time(stop, "stop", section.stop), rtol=section.rtol if rtol is None else rtol, solver=solver or section.solver,
-            max_step=_time(max_step, "max_step", section.max_step), output_step=_time(output_step, "output_step", section.output_step),
+            stop=_time(stop, "stop", section.stop), rtol=section.rtol if rtol is None else rtol,
+            solver=solver or section.solver, max_step=_time(max_step, "max_step", section.max_step),
+            output_step=_time(output_step, "output_step", section.output_step),
         )  # fmt: skip
         _check(options)
         values = system.values(design)
@@ -152,7 +153,7 @@ def _check(options: Options) -> None:
         raise InputError(f"solver {options.solver!r}: {nearest(options.solver, SOLVERS)}")
     if options.output_step is not None and options.stop / options.output_step > MAX_ROWS:
         raise InputError(
-            f"output_step {options.output_step:g} s makes more than {MAX_ROWS} rows until {options.stop:g} s; write a longer one"
+            f"output_step {options.output_step:g} s makes more than {MAX_ROWS} rows; write a longer one"
         )
 
 

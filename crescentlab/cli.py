@@ -49,7 +49,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         sys.stdout.flush()
         return code
     except SystemExit as done:  # --help and --version
-        return int(done.code or 0)
+        return done.code if isinstance(done.code, int) else DONE if done.code is None else BUG
     except (InputError, ComponentError) as error:
         return _failed(arguments, str(error), WRONG_INPUT, "invalid")
     except KeyboardInterrupt as stop:
@@ -92,7 +92,7 @@ def _parsed(arguments: list[str]) -> argparse.Namespace:
     given = next((a for a in arguments if not a.startswith("-")), None)
     if given is not None and given not in commands:
         raise InputError(f"unknown command {given!r}: {nearest(given, commands)}")
-    options, extra = parser.parse_known_args(arguments)
+    options, extra = parser.parse_known_args(arguments, argparse.Namespace(verbose=False, no_code=False))
     if extra:
         raise InputError(_unexpected(extra, commands[given] if given else parser, given or ""))
     if options.command is None:
@@ -121,7 +121,6 @@ def _parser() -> tuple[argparse.ArgumentParser, dict[str, argparse.ArgumentParse
         "crescentlab", description="Hydraulic circuits as one global ODE.", allow_abbrev=False, parents=[common]
     )
     parser.add_argument("--version", action="version", version=f"crescentlab {__version__}")
-    parser.set_defaults(verbose=False, no_code=False)
     chosen = parser.add_subparsers(dest="command", metavar="COMMAND", title="commands")
     commands: dict[str, argparse.ArgumentParser] = {}
     for name, text in COMMANDS.items():

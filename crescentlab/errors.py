@@ -75,13 +75,13 @@ class SimulationError(CrescentlabError):
     """The integration cannot go on; what was computed so far is kept by the caller."""
 
 
-def nearest(name: str, known: Iterable[str], *, limit: int = 3) -> str:
-    """The sentence that offers names like the one received, or lists what exists."""
+def nearest(name: str, known: Iterable[str], *, limit: int = 3, otherwise: str = "") -> str:
+    """The sentence that offers names like the one received, or says ``otherwise``, or lists what exists."""
     names = sorted(set(known))
     close = difflib.get_close_matches(name, names, n=limit, cutoff=0.5)
     if close:
         return f"did you mean {' or '.join(close)}?"
-    if not names:
-        return "there are none"
+    if otherwise or not names:
+        return otherwise or "there are none"
     shown = ", ".join(names[:12])
     return f"known: {shown}{', ...' if len(names) > 12 else ''}"

@@ -16,6 +16,7 @@ from fractions import Fraction
 from functools import cache
 from typing import Any
 
+import casadi as ca
 import numpy as np
 
 from crescentlab import maths
@@ -273,7 +274,7 @@ class _Walker:
             return Value(_float(maths.tan(value.value) - value.value), QUANTITIES["angle"])
         if name in _WHOLE:
             if isinstance(value.value, Sym):
-                raise self.fail(f"{name} works on parameters only")
+                return Value(value.value.map({"floor": ca.floor, "ceil": ca.ceil, "round": _round}[name]))
             return Value(float(_WHOLE[name](value.value)))
         if name == "log" and isinstance(value.value, float) and value.value <= 0:
             raise self.fail(f"the logarithm of {value.value:g}")
@@ -295,6 +296,10 @@ class _Walker:
             whole.value[..., index.value - 1] if isinstance(whole.value, np.ndarray) else whole.value[index.value - 1],
             whole.quantity,
         )
+
+
+def _round(x: ca.SX) -> ca.SX:
+    return ca.floor(x + 0.5)
 
 
 def _float(value: Any) -> Any:

@@ -29,7 +29,7 @@ LARGE = 250
 """Above this number of boxes the quick layout has to do."""
 
 
-def place(graph: nx.Graph, sizes: Sizes) -> Places:
+def place(graph: nx.Graph[Hashable], sizes: Sizes) -> Places:
     """Centres of boxes of the given sizes (width, height) [inch]; disconnected parts stand side by side."""
     shown: Places = {}
     left = 0.0
@@ -42,14 +42,14 @@ def place(graph: nx.Graph, sizes: Sizes) -> Places:
     return shown
 
 
-def _part(graph: nx.Graph, sizes: Sizes) -> Places:
+def _part(graph: nx.Graph[Hashable], sizes: Sizes) -> Places:
     nodes = sorted(graph.nodes, key=str)
     if len(nodes) == 1:
         return {nodes[0]: (0.0, 0.0)}
     size = np.array([sizes[n] for n in nodes])
     index = {n: k for k, n in enumerate(nodes)}
     lines = np.array([(index[a], index[b]) for a, b in graph.edges])
-    ordered = nx.Graph()
+    ordered: nx.Graph[Hashable] = nx.Graph()
     ordered.add_nodes_from(nodes)
     ordered.add_edges_from(sorted(graph.edges, key=str))
     if len(nodes) > LARGE:

@@ -24,10 +24,11 @@ COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#0
 LINES = ("-", "--", "-.", ":")
 LINES_PER_PLOT = 7
 """Most net pressures in one picture of a circuit without ``plots:``."""
-STYLE = {
-    "font.size": 10.0, "figure.titlesize": 12.0, "figure.titleweight": "bold", "axes.grid": True,
-    "grid.color": "#d9d9d9", "grid.linewidth": 0.6, "axes.axisbelow": True, "axes.spines.top": False, "axes.spines.right": False,
-    "lines.linewidth": 1.4, "legend.frameon": False, "savefig.dpi": 150.0, "agg.path.chunksize": 20000, "svg.fonttype": "none",
+STYLE: dict[Any, Any] = {
+    "font.size": 10.0, "figure.titlesize": 12.0, "figure.titleweight": "bold", "lines.linewidth": 1.4,
+    "axes.grid": True, "grid.color": "#d9d9d9", "grid.linewidth": 0.6, "axes.axisbelow": True,
+    "axes.spines.top": False, "axes.spines.right": False, "legend.frameon": False,
+    "savefig.dpi": 150.0, "agg.path.chunksize": 20000, "svg.fonttype": "none",
 }  # fmt: skip
 
 

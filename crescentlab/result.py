@@ -184,7 +184,10 @@ def check_record(system: System, record: Sequence[str]) -> None:
 
 
 def matching(globs: Sequence[str], names: Sequence[str], subject: str) -> list[str]:
-    """The names that match the globs, in the globs' order; only ``*`` and ``?`` are wild, a vector's name is all its elements."""
+    """The names that match the globs, in the globs' order.
+
+    Only ``*`` and ``?`` are wild, ``[2]`` is literal; a vector's name means all its elements.
+    """
     chosen: dict[str, None] = {}
     for glob in globs:
         wild = "".join(".*" if c == "*" else "." if c == "?" else re.escape(c) for c in glob)
@@ -200,7 +203,8 @@ def check_target(path: Path) -> None:
     """Refuse an output file that cannot be written, before the run."""
     if path.suffix not in SUFFIXES:
         raise InputError(
-            f"-o {path}: the suffix {path.suffix!r} is none of {', '.join(SUFFIXES)}; write for example -o {path.stem or 'result'}.nc"
+            f"-o {path}: the suffix {path.suffix!r} is none of {', '.join(SUFFIXES)}; "
+            f"write for example -o {path.stem or 'result'}.nc"
         )
     if not path.parent.is_dir():
         raise InputError(f"-o {path}: the folder {path.parent} does not exist; make it first")
@@ -288,14 +292,13 @@ def read_series(path: Path) -> tuple[np.ndarray, dict[str, np.ndarray], dict[str
 
 def _read_csv(path: Path) -> tuple[np.ndarray, dict[str, np.ndarray], dict[str, str], dict[str, Any]]:
     with path.open(newline="", encoding="utf-8") as file:
-        titles = next(csv.reader(file))
-    data = np.loadtxt(path, delimiter=",", skiprows=1, ndmin=2)
+        titles, *rows = list(csv.reader(file)) or [[]]
     split = [re.fullmatch(r"(.*) \[(.*)\]", t) for t in titles]
-    if not all(split):
-        raise ValueError("a column title has no unit")
-    names = [m[1] for m in split if m]
+    if not rows or not all(split) or titles[0] != "time [s]":
+        raise ValueError("its first line is not `time [s]` and names with units")
     units = {m[1]: m[2] for m in split if m}
-    return data[:, 0], dict(zip(names[1:], data.T[1:], strict=True)), units, {}
+    time, *series = np.array(rows, dtype=float).T
+    return time, dict(zip(list(units)[1:], series, strict=True)), units, {}
 
 
 def _read_parquet(path: Path) -> tuple[np.ndarray, dict[str, np.ndarray], dict[str, str], dict[str, Any]]:

@@ -17,7 +17,8 @@ from crescentlab.placement import place
 
 SUFFIXES = (".svg", ".png", ".pdf")
 COLOURS = {
-    "hydraulic": "#0072B2", "translational": "#D55E00", "rotational": "#009E73", "chamber": "#AA4499", "signal": "#777777",
+    "hydraulic": "#0072B2", "translational": "#D55E00", "rotational": "#009E73", "chamber": "#AA4499",
+    "signal": "#777777",
 }  # fmt: skip
 TINTS = ("#FFF6DD", "#E7F3EC", "#F4E9F4", "#E6F1FA", "#FBE9E1")
 """Fills of subcircuits, so that their components are seen to belong together."""
@@ -110,7 +111,7 @@ def _figure(shown: Sheet, title: str) -> Any:
         for n, (name, kind) in shown.boxes.items()
     }
     sizes |= {n: (len(name) * 0.8 * CHARACTER + 0.08, 0.36) for n, (name, _) in shown.dots.items()}
-    graph = nx.Graph()
+    graph: nx.Graph[Hashable] = nx.Graph()
     graph.add_nodes_from(sizes)
     graph.add_edges_from((line.component, line.net) for line in shown.lines)
     places = place(graph, sizes)
@@ -185,8 +186,8 @@ def _draw_boxes(axes: Any, shown: Sheet, places: Any, sizes: Any) -> None:
         fill = TINTS[parts.index(name.partition(".")[0]) % len(TINTS)] if "." in name else "white"
         axes.add_patch(
             FancyBboxPatch(
-                (x - width / 2, y - height / 2), width, height, boxstyle="round,pad=0,rounding_size=0.06", facecolor=fill,
-                edgecolor=INK, linewidth=1.0, zorder=3,
+                (x - width / 2, y - height / 2), width, height, boxstyle="round,pad=0,rounding_size=0.06",
+                facecolor=fill, edgecolor=INK, linewidth=1.0, zorder=3,
             )
         )  # fmt: skip
         axes.text(x, y + 0.08, name, fontsize=8.5, fontweight="bold", ha="center", va="center", color=INK, zorder=5)
@@ -203,8 +204,8 @@ def _draw_dots(axes: Any, shown: Sheet, places: Any) -> None:
         x, y = _dot(places[node])
         axes.plot([x], [y], "o", color=COLOURS[domain], markersize=6, zorder=6)
         axes.text(
-            x, y + 0.17, name, fontsize=7, fontstyle="italic", ha="center", va="center", color=COLOURS[domain], zorder=7,
-            bbox={"boxstyle": "square,pad=0.05", "facecolor": "white", "edgecolor": "none", "alpha": 0.85},
+            x, y + 0.17, name, fontsize=7, fontstyle="italic", ha="center", va="center", color=COLOURS[domain],
+            zorder=7, bbox={"boxstyle": "square,pad=0.05", "facecolor": "white", "edgecolor": "none", "alpha": 0.85},
         )  # fmt: skip
 
 

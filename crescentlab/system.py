@@ -154,6 +154,8 @@ class System:
     """The assembled circuit; see the module docstring. Made by :func:`assemble`."""
 
     plan: Plan
+    output_parameters: tuple[tuple[str, str], ...]
+    """Scope and name of the circuit parameters that stand at the end of p."""
     t: ca.SX
     x: ca.SX
     h: ca.SX
@@ -271,6 +273,7 @@ class System:
             h0 += [
                 _start(instance.start, s, component, mine, name, instance.place) for s in type(component).declared(Held)
             ]
+        p += [float(design.parameters[scope][name].value) for scope, name in self.output_parameters]
         return Values(np.array(p), _join(x0), _join(h0))
 
 
@@ -319,6 +322,8 @@ class _Assembly:
         self.resolved: set[str] = set()
         self.running: list[str] = []
         self.pending: dict[str, Output] = {}
+        self.used: dict[tuple[str, str], ca.SX] = {}
+        """Circuit parameters that outputs refer to; they follow the components' in p."""
 
     def call(self, name: str, function: ca.Function, u: ca.SX) -> ca.SX:
         xs, hs, bs, ps, pf = self.arguments[name]
@@ -361,7 +366,7 @@ class _Assembly:
             [0, derivative.numel(), derivative.numel() + _cat(relations).numel()],
         )
         return System(
-            plan, self.t, self.x, self.h, b, self.p, derivative, g, _cat(scales), _cat(conditions), _cat(periods), clock, tuple(events),
+            plan, tuple(self.used), self.t, self.x, self.h, b, _cat([self.p, *self.used.values()]), derivative, g, _cat(scales), _cat(conditions), _cat(periods), clock, tuple(events),
             *self.names(State), self.nominal(), *self.names(Held), self.bits(g, b), self.variables,
             self.remap, self.contents(),
         )  # fmt: skip
@@ -579,7 +584,7 @@ class _Assembly:
 
         def find(name: str) -> Value:
             if name in parameters:
-                return parameters[name]
+                return self.parameter(scope, name, parameters[name])
             if scope + name in self.pending:
                 self.resolve(self.pending[scope + name], variables)
             variable = variables.get(scope + name)
@@ -590,6 +595,14 @@ class _Assembly:
             return Value(Sym(_cat(parts), (len(parts),)) if variable.vector else Sym(parts[0]), variable.quantity)
 
         return find
+
+    def parameter(self, scope: str, name: str, value: Value) -> Value:
+        """A circuit parameter inside an output: a symbol, so that a changed value needs no new assembly."""
+        if isinstance(value.value, str):
+            return value
+        if (scope, name) not in self.used:
+            self.used[scope, name] = ca.SX.sym(f"{scope}{name}")
+        return Value(Sym(self.used[scope, name]), value.quantity)
 
     def resolve(self, output: Output, variables: dict[str, Variable]) -> None:
         """Make an output's variable, after those of the outputs it uses."""

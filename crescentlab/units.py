@@ -44,13 +44,11 @@ class Quantity:
 
     def parse(self, text: str) -> float:
         """Return ``text`` (number and unit) in SI; raise :class:`UnitError` saying what to write."""
-        match = _NUMBER.match(text)
-        if not match:
-            raise UnitError(f"{text!r} is not a number with a unit; write for example {self.example()}")
-        number, unit = float(match[1]), match[2]
-        if not math.isfinite(number):
+        number, unit = _split(text, f"; write for example {self.example()}")
+        value = number * self.factor(unit, text) + self.offsets.get(normalise(unit), 0.0)
+        if not math.isfinite(value):
             raise UnitError(f"{text!r} is not a finite number")
-        return number * self.factor(unit, text) + self.offsets.get(normalise(unit), 0.0)
+        return value
 
     def factor(self, unit: str, text: str = "") -> float:
         """Return the factor of ``unit`` to SI; raise :class:`UnitError` if it is not this quantity's."""
@@ -59,19 +57,24 @@ class Quantity:
             return self.units[key]
         said = f"{text!r}: " if text else ""
         if not key:
-            raise UnitError(f"{said}a {self.title} needs a unit; write for example {self.example(text)}")
+            raise UnitError(f"{said}{self.titled} needs a unit; write for example {self.example(text)}")
         others = [q.title for q in QUANTITIES.values() if key in q.units]
         if others:
             raise UnitError(
                 f"{said}{unit!r} is a unit of {' and '.join(others[:3])}, not of {self.title}; "
                 f"write one of {self.choices()}"
             )
-        raise UnitError(f"{said}unknown unit {unit!r} for a {self.title}; write one of {self.choices()}")
+        raise UnitError(f"{said}unknown unit {unit!r} for {self.titled}; write one of {self.choices()}")
 
     @property
     def title(self) -> str:
         """The quantity's name in words."""
         return self.name.replace("_", " ")
+
+    @property
+    def titled(self) -> str:
+        """The quantity's name in words with its article."""
+        return f"{'an' if self.name[0] in 'aeio' else 'a'} {self.title}"
 
     def choices(self) -> str:
         """The first accepted units, for messages."""
@@ -99,6 +102,16 @@ class Quantity:
             except UnitError as error:
                 raise PydanticCustomError("unit", "{reason}", {"reason": error.message}) from None
         return value
+
+
+def _split(text: str, advice: str = "") -> tuple[float, str]:
+    """The number and the unit of a text; raise :class:`UnitError` if it does not begin with a number."""
+    match = _NUMBER.match(text)
+    if not match:
+        raise UnitError(f"{repr(text) + ' is not a number with a unit' if text.strip() else 'the value is missing'}{advice}")
+    if re.match(r",\d", match[2]):
+        raise UnitError(f"{text!r}: decimals follow a point; write {text.replace(',', '.', 1)}")
+    return float(match[1]), match[2]
 
 
 def normalise(unit: str) -> str:
@@ -264,6 +277,9 @@ FlowResistance = Annotated[float, flow_resistance]
 QuadraticResistance = Annotated[float, quadratic_resistance]
 FlowConductance = Annotated[float, flow_conductance]
 
+COMMON = "bar, L/min, mm, mm^2, cm^3, rpm, ms, deg, N, Nm, kg, cSt"
+"""Units that messages name where the quantity is not known."""
+
 DISPLAY = {
     "pressure": "bar", "flow": "L/min", "length": "mm", "speed": "rpm", "time": "ms", "angle": "deg",
 }  # fmt: skip
@@ -288,16 +304,17 @@ def quantity_named(name: str) -> Quantity:
 
 
 def parse_any(text: str) -> tuple[float, Quantity]:
-    """Read a number with a unit of whichever quantity owns it (the first listed, if several do)."""
-    match = _NUMBER.match(text)
-    if not match:
-        raise UnitError(f"{text!r} is not a number with a unit")
-    key = normalise(match[2])
-    for candidate in QUANTITIES.values():
-        if key in candidate.units:
-            return candidate.parse(text), candidate
-    known = [u for q in QUANTITIES.values() for u in q.units]
-    raise UnitError(f"{text!r}: unknown unit {match[2]!r}: {nearest(key, known)}")
+    """Read a number with a unit of whichever quantity owns it; a unit that two read differently is refused."""
+    _, unit = _split(text)
+    key = normalise(unit)
+    owners = [q for q in QUANTITIES.values() if key in q.units]
+    if not owners:
+        known = [u for q in QUANTITIES.values() for u in q.units if u]
+        raise UnitError(f"{text!r}: unknown unit {unit!r}: {nearest(key, known, otherwise=f'units are {COMMON} and the like')}")
+    if len({q.units[key] for q in owners}) > 1:
+        said = " or ".join(q.titled for q in owners)
+        raise UnitError(f"{text!r} may be {said}; write {' or '.join(next(iter(q.units)) for q in owners)}")
+    return owners[0].parse(text), owners[0]
 
 
 def is_number(text: str) -> bool:

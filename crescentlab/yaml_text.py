@@ -17,7 +17,8 @@ import yaml
 from crescentlab.errors import InputError, Place
 
 MAX_BYTES = 8_000_000
-MAX_NODES = 2_000_000
+MAX_ALIASED = 100_000
+"""Most values that aliases may stand for, so that a short file stays short."""
 MAX_DEPTH = 40
 
 _Loader: Any = getattr(yaml, "CBaseLoader", yaml.BaseLoader)
@@ -72,20 +73,22 @@ class Node:
 def read(path: Path, shown: str | None = None) -> Node:
     """Read the file; raise :class:`InputError` with file and line for anything that is not YAML."""
     name = shown or str(path)
+    data = b""
     try:
         size = path.stat().st_size
         if size > MAX_BYTES:
             raise InputError(
-                f"the file has {size} bytes; a circuit file may have {MAX_BYTES}, so split it into subcircuits",
-                Place(name, 1),
+                f"the file has {size} bytes; a circuit file may have {MAX_BYTES}, so split it into subcircuits", Place(name, 1)
             )
-        text = path.read_text(encoding="utf-8-sig")
+        data = path.read_bytes()
+        text = data.decode("utf-8-sig")
     except IsADirectoryError:
         raise InputError("this is a folder; name a circuit file in it", Place(name, 1)) from None
     except OSError as error:
         raise InputError(f"cannot read the file: {error.strerror}", Place(name, 1)) from None
-    except UnicodeDecodeError:
-        raise InputError("the file is not text in UTF-8", Place(name, 1)) from None
+    except UnicodeDecodeError as error:
+        place = Place(name, 1 + data.count(b"\n", 0, error.start))
+        raise InputError(f"byte 0x{data[error.start]:02x} is not text in UTF-8; save the file as UTF-8", place) from None
     return parse(text, name)
 
 
@@ -95,36 +98,97 @@ def parse(text: str, name: str) -> Node:
     try:
         return _Builder(name, lines).build(text)
     except yaml.MarkedYAMLError as error:
-        mark = error.problem_mark or error.context_mark
-        line = mark.line + 1 if mark else 1
-        raise InputError(_explain(error.problem or "cannot be read", lines, line), Place(name, line)) from None
-    except yaml.YAMLError as error:  # a character YAML does not allow
-        raise InputError(f"not YAML: {str(error).splitlines()[0]}", Place(name, 1)) from None
+        said, line = _explained(error, lines)
+        raise InputError(said, Place(name, line)) from None
+    except yaml.reader.ReaderError as error:  # a character YAML does not allow
+        code = error.character if isinstance(error.character, int) else ord(error.character)
+        place = Place(name, 1 + text.count("\n", 0, max(text.find(chr(code)), 0)))
+        raise InputError(f"the character U+{code:04X} is not allowed in YAML; remove it", place) from None
 
 
-def _explain(problem: str, lines: list[str], line: int) -> str:
-    shown = lines[line - 1] if 0 < line <= len(lines) else ""
-    better = quoted(shown)
-    if better != shown:
-        return f"text with brackets or commas inside {{}} or [] must be quoted; write: {better.strip()}"
+# -- what is wrong, and what to write instead ----------------------------------------------------
+
+
+def _explained(error: yaml.MarkedYAMLError, lines: list[str]) -> tuple[str, int]:
+    """A sentence for the parser's error, and the line to look at."""
+    mark, context, problem = error.problem_mark or error.context_mark, error.context_mark, error.problem or ""
+    line = mark.line + 1 if mark else 1
+    begun = context.line + 1 if context else line
+    flow = "flow" in (error.context or "")
+    shown, first = _line(lines, line), _line(lines, begun)
+    if (better := quoted(shown, flow and begun < line)) != shown:
+        return f"{MUST_QUOTE}: {better.strip()}", line
     if "\t" in shown[: len(shown) - len(shown.lstrip())]:
-        return "not YAML: a tab at the beginning of the line; indent with spaces"
-    return f"not YAML: {problem}; look at: {shown.strip()!r}"
+        return "a tab at the beginning of the line; indent with spaces", line
+    if flow and (line > len(lines) or (line > begun and _indent(shown) <= _indent(first))):
+        return f"a bracket opened here is never closed; look at: {first.strip()}", begun
+    if flow and ("' or '" in problem or "mapping values" in problem):
+        return f"brackets do not match, a comma is missing, or text with a colon needs quotes; look at: {shown.strip()}", line
+    if "end of stream" in problem:
+        return f"a quote opened here is never closed; look at: {first.strip()}", begun
+    if "expected ':'" in problem:
+        if glued := re.match(r"\s*([\w.]+):(\S.*)", first):
+            return f"a blank is missing after the colon; write: {glued[1]}: {glued[2]}", begun
+        return f"a colon is missing; write: {first.strip()}:", begun
+    if "mapping values" in problem:
+        return f"a colon where none can stand; quote text that holds one, and look at the indentation of: {shown.strip()}", line
+    if "start any token" in problem and mark and mark.column < len(shown):
+        return f"text that begins with {shown[mark.column]} must be quoted; look at: {shown.strip()}", line
+    if "expected" in problem and not flow:
+        return f"this does not continue what stands above it; look at indentation and brackets of: {shown.strip()}", line
+    return f"not YAML: {problem or 'it cannot be read'}; look at: {shown.strip()}", line
 
 
-_INDEXED = re.compile(r"(?<![\w.\"'\[])((?:\w+\.)+\w+\[[^\[\]]*\])(?![\"'])")
-_EXPRESSION = re.compile(r"(?<=[:\[,])(\s*)(=\s*[^\"'{}]*?\((?:[^()]|\([^()]*\))*\)[^,{}\[\]\"']*?)(\s*)(?=[,}\]])")
+MUST_QUOTE = "text with brackets or commas inside {} or [] must be quoted; write"
 
 
-def quoted(line: str) -> str:
-    """The line with references such as ``chain[1]`` and expressions with commas put in quotes."""
-    start = next((i for i, c in enumerate(line) if c in "[{"), None)
-    if start is None:
+def _line(lines: list[str], number: int) -> str:
+    return lines[number - 1] if 0 < number <= len(lines) else ""
+
+
+def _indent(line: str) -> int:
+    return len(line) - len(line.lstrip())
+
+
+_FLOW = re.compile(r"(?:^|(?<=:)|(?<=-))\s+(?=[\[{])|^(?=[\[{])")
+_QUOTE = re.compile(r"'(?:[^']|'')*'|\"(?:[^\"\\\\]|\\\\.)*\"")
+
+
+def quoted(line: str, flow: bool = False) -> str:
+    """The line with references such as ``chain[1]`` and expressions with commas put in quotes.
+
+    Only what stands inside ``{}`` or ``[]`` needs them; ``flow`` says that the line begins there.
+    """
+    begin = _FLOW.search(line)
+    if not (flow or begin):
         return line
-    head, tail = line[:start], line[start:]
-    tail = _EXPRESSION.sub(lambda m: f"{m[1]}'{m[2].strip()}'{m[3]}", tail)
-    tail = tail[0] + _INDEXED.sub(r"'\1'", tail[1:])
-    return head + tail
+    at = 0 if flow or begin is None else begin.end()
+    out = [line[:at]]
+    while at < len(line):
+        if line.startswith(" #", at - 1):
+            return "".join(out) + line[at:]
+        match = _QUOTE.match(line, at)
+        end = match.end() if match else at + 1 if line[at] in " \t,:[]{}" else _plain_end(line, at)
+        text = line[at:end].rstrip()
+        if not match and end > at + 1 and set(text) & set(",[]{}"):
+            text = "'" + text.replace("'", "''") + "'"
+        out.append(text + line[at + len(line[at:end].rstrip()) : end])
+        at = end
+    return "".join(out)
+
+
+def _plain_end(line: str, at: int) -> int:
+    """Where the text that begins at ``at`` ends, were its brackets and their commas part of it."""
+    depth = 0
+    for k in range(at, len(line)):
+        c = line[k]
+        if c in "([":
+            depth += 1
+        elif c in ")]" and depth:
+            depth -= 1
+        elif depth == 0 and (c in ",]}" or line.startswith((": ", " #"), k)):
+            return k
+    return len(line) if not depth else at + 1  # an open bracket: leave it alone
 
 
 class _Builder:
@@ -134,8 +198,9 @@ class _Builder:
         self.name, self.lines = name, lines
         self.anchors: dict[str, Node] = {}
         self.stack: list[tuple[Node, str | None, str | None]] = []  # node, its anchor, pending key
+        self.flow = 0  # how many of the innermost nodes on the stack are written in {} or []
         self.root: Node | None = None
-        self.count = 0
+        self.aliased = 0
 
     def build(self, text: str) -> Node:
         documents = 0
@@ -157,20 +222,28 @@ class _Builder:
                     raise InputError(f"nested deeper than {MAX_DEPTH} levels", self.place(event))
                 kind: dict[str, Node] | list[Node] = {} if isinstance(event, yaml.MappingStartEvent) else []
                 self.stack.append((Node(kind, self.place(event)), event.anchor, None))
+                self.flow += 1 if event.flow_style else 0
             elif isinstance(event, (yaml.MappingEndEvent, yaml.SequenceEndEvent)):
                 node, anchor, _ = self.stack.pop()
+                self.flow = max(self.flow - 1, 0)
                 self.add(node, anchor, event)
         if self.root is None:
-            raise InputError("the file is empty; a circuit begins with `crescentlab: 1`", Place(self.name, 1))
+            raise InputError("the file is empty; a circuit begins with crescentlab: 1", Place(self.name, 1))
         return self.root
+
+    def continued(self, event: Any) -> bool:
+        """Whether the event's line begins inside ``{}`` or ``[]`` opened further up."""
+        opened = self.stack[-1][0].place if self.flow else None
+        return opened is not None and opened.line < self.place(event).line
 
     def place(self, event: Any) -> Place:
         return Place(self.name, event.start_mark.line + 1)
 
     def add(self, node: Node, anchor: str | None, event: Any) -> None:
-        self.count += node.size if isinstance(event, yaml.AliasEvent) else 1
-        if self.count > MAX_NODES:
-            raise InputError(f"the file expands to more than {MAX_NODES} values (aliases included)", self.place(event))
+        if isinstance(event, yaml.AliasEvent):
+            self.aliased += node.size
+        if self.aliased > MAX_ALIASED:
+            raise InputError(f"aliases (*name) expand to more than {MAX_ALIASED} values; write them out", self.place(event))
         if anchor:
             self.anchors[anchor] = node
         if not self.stack:
@@ -184,29 +257,34 @@ class _Builder:
             return
         else:
             assert isinstance(parent.value, dict)
-            if (
-                node.value == ""
-                and isinstance(event, yaml.ScalarEvent)
-                and not event.style
-                and (")" in key or "]" in key)
-            ):
-                self.slip(event)
+            if self.flow and node.value == "" and isinstance(event, yaml.ScalarEvent) and not event.style:
+                self.no_value(parent.value, key, event)
             parent.value[key] = node
             self.stack[-1] = (parent, parent_anchor, None)
-        parent.size = min(parent.size + node.size, MAX_NODES + 1)
+        parent.size = min(parent.size + node.size, MAX_ALIASED + 1)
 
     def key(self, parent: Node, node: Node, event: Any) -> str:
+        line = _line(self.lines, self.place(event).line)
         if not isinstance(node.value, str):
-            raise InputError(_explain("a key must be a word", self.lines, self.place(event).line), self.place(event))
+            better = quoted(line, self.continued(event))
+            raise InputError(f"{MUST_QUOTE}: {better.strip()}" if better != line else f"a key must be a word; look at: {line.strip()}", self.place(event))
+        if not event.style and (bracket := re.match(r"([\w.]+)\s+([\[{].*)", node.value)):
+            raise InputError(f"a colon is missing before the bracket; write: {bracket[1]}: {line.strip().removeprefix(bracket[1]).strip()}", node.place)
+        if not event.style and (glued := re.match(r"([A-Za-z_][\w.]*):(\S.*)", node.value)):
+            raise InputError(f"a blank is missing after the colon; write: {glued[1]}: {glued[2]}", node.place)
         if node.value in parent.keys:
             first = parent.keys[node.value]
-            raise InputError(
-                f"the key {node.value!r} stands twice (first in line {first.line if first else '?'}); remove one",
-                node.place,
-            )
+            raise InputError(f"the key {node.value!r} stands twice (first in line {first.line if first else '?'}); remove one", node.place)
         parent.keys[node.value] = node.place
         return node.value
 
-    def slip(self, event: Any) -> None:
+    def no_value(self, parent: dict[str, Node], key: str, event: Any) -> None:
+        """Refuse a key without a value inside ``{}``: mostly the rest of a text that holds a comma."""
         place = self.place(event)
-        raise InputError(_explain("a key without a value", self.lines, place.line), place)
+        line = _line(self.lines, place.line)
+        better = quoted(line, self.continued(event))
+        if better != line:
+            raise InputError(f"{MUST_QUOTE}: {better.strip()}", place)
+        before, node = next(reversed(parent.items()), ("", Node("")))
+        hint = f", or quote text that holds a comma: {before}: '{node.value}, {key}'" if isinstance(node.value, str) and before else ""
+        raise InputError(f"{key!r} has no value; write {key}: ...{hint}", place)

@@ -418,7 +418,7 @@ def test_mean_volumes_give_the_same_result(rpm, bar):
 
 @pytest.mark.parametrize(("gauge", "beta"), [(3.0, 2460), (3.6, 3000), (4.0, 3331), (6.0, 4994), (7.35, 6000)])
 def test_figure_20_bulk_modulus(gauge, beta):
-    """Fig. 20 and section 6.3: 3000 to 6000 bar over the pump's range, of the circuit's own fluid; 1 % by their digits."""
+    """Fig. 20 and section 6.3: 3000 to 6000 bar over the pump's range, of the circuit's own fluid; 1 %."""
     (oil,) = pump().design().fluids.values()
     p, dp = gauge * BAR, 10.0
     assert oil.bulk_modulus(p) / BAR == pytest.approx(beta, rel=0.01)
@@ -438,7 +438,7 @@ def source_flow(rpm: int, run: Settled) -> np.ndarray:
 def through(
     pipe: tuple[float, float], admittance: complex, loss: float, rho: float, beta: float, s: complex
 ) -> complex:
-    """Admittance [m^3/(s Pa)] at the inlet of a (diameter, length) line that ends in ``admittance``; loss dp/q [Pa s/m^3]."""
+    """Admittance [m^3/(s Pa)] into a line of (diameter, length) that ends in ``admittance``; loss dp/q [Pa s/m^3]."""
     area, length = math.pi / 4 * pipe[0] ** 2, pipe[1]
     series, shunt = 2 * loss / length + s * rho / area, s * area / beta
     wave, tangent = cmath.sqrt(series / shunt), cmath.tanh(cmath.sqrt(series * shunt) * length)
@@ -489,13 +489,13 @@ def test_table_1_deflection_of_the_cover():
 
 
 def test_cover_opens_gap_1():
-    """Section 3: the leakage past the cover side is that of the deflection cubed, zero without pressure (Eqs. 17, 18)."""
+    """Section 3, Eqs. 17 and 18: the leakage on the cover side goes with the deflection cubed; b1, b4 as printed."""
     run = at_pressure(2000, 5.0)
     p, dh = run.last("delivery.p"), run.last("cover_deflection.value")
     mu = 0.0301 * run.result.design.fluids["fluid"].density(p / 2) / RHO
     roots = 5 * 2.391e-3 * dh**3 * p / (12 * mu * 3.5e-3)
     faces = 5 * 6.24e-3 * (0.75 * dh) ** 3 * p / (12 * mu * 5.3625e-3)
-    assert run.last("gap_1_roots.q") == pytest.approx(roots, rel=1e-3)  # b1, b4 to four and three digits
+    assert run.last("gap_1_roots.q") == pytest.approx(roots, rel=1e-3)
     assert run.last("gap_1_faces.q") == pytest.approx(faces, rel=1e-3)
 
 
@@ -590,7 +590,7 @@ def test_more_displacement_with_more_teeth():
     ],
 )
 def test_impossible_geometry_is_one_input_error(given, named):
-    """Notes: geometry without continuous meshing is an input error that names the parameters, in one line with its place."""
+    """Geometry without continuous meshing is an input error in one line, with its place, naming the parameters."""
     with pytest.raises(InputError) as caught:
         pump().simulate("1 ms", given)
     text = str(caught.value)
@@ -631,7 +631,7 @@ def test_energy(turn):
 
 
 def test_suction_pressure():
-    """Assumed inlet port of 20 mm, Cd 0.7: about 0.07 bar lost at 54 L/min, so the suction is below the sump by that."""
+    """Assumed inlet port of 20 mm, Cd 0.7: about 0.07 bar lost at 54 L/min, below the sump."""
     run = wide_open(4000)
     q = run.mean("inlet.q")
     assert q == pytest.approx(54 * LPM, rel=0.03)
@@ -653,11 +653,13 @@ def test_peak_in_the_trapped_volume_is_that_of_its_gap(rpm):
 
 
 def test_carry_over_pressures_lie_between_suction_and_delivery(turn):
-    """A carry-over volume is filled from delivery and emptied to suction; drag adds what its tip gaps let through."""
+    """Eqs. 24 and 25: no more than the drag can hold up, 6 mu v l/h^2 per tip, above delivery or below suction."""
+    speed = 2000 * math.pi / 30 * 29.1 * MM
+    held_up = 6 * RHO * NU * speed * 2.478 * MM / (150e-6) ** 2
     for name in ("driver.p", "driven.p"):
-        p = turn.result[f"p_{name}"] if f"p_{name}" in turn.result.names else turn.last(name)
-        assert p.min() > turn.last("suction.p").min() - 0.2 * BAR
-        assert p.max() < turn.result["delivery.p"].max() + 0.2 * BAR
+        p = turn.last(name)
+        assert p.min() > turn.last("suction.p").min() - held_up
+        assert p.max() < turn.last("delivery.p").max() + held_up
 
 
 # --- 2.2: the collar as a bearing -------------------------------------------------------------------------------------
@@ -703,11 +705,11 @@ def test_collar_is_a_short_bearing_that_runs_far_off_centre():
 
 @pytest.mark.xfail(
     strict=True,
-    reason="with the assumed clearance of 40 um Ocvirk gives 0.79 to 0.92; 0.95 needs 100 um, which is not in the paper",
+    reason="with the assumed clearance of 40 um Ocvirk gives 0.79 to 0.89; 0.95 needs about 0.1 mm",
 )
 @pytest.mark.parametrize(("rpm", "bar"), [(1000, 5), (2000, 5), (3000, 5), (4000, 5)])
 def test_eccentricity_of_the_collar(rpm, bar):
-    """Section 2.2: an eccentricity ratio around 0.95 is a good compromise for the entire speed range; 0.02 either way."""
+    """Section 2.2: an eccentricity ratio around 0.95 is a good compromise over the speed range; by 0.02."""
     assert collar_eccentricity(rpm, bar * BAR) == pytest.approx(0.95, abs=0.02)
 
 

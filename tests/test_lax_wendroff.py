@@ -18,6 +18,7 @@ from crescentlab.components.lax_wendroff import (
 from crescentlab.components.wave_laws import arriving_wave, full_step, half_step, pressure_of_density
 
 from crescentlab.domain import Held
+from crescentlab.maths import Failure
 from crescentlab.symbols import Sym
 
 THIN = SimpleOil(density=870.0, kinematic_viscosity=1e-9, bulk_modulus=1.6e9)
@@ -103,7 +104,7 @@ def symbol(name: str, shape: tuple[int, ...]) -> Sym:
 
 
 def compiled(symbols: dict[str, Sym], returned: dict[str, Any]) -> ca.Function:
-    outputs = {f"new_{name}": Sym.of(value).sx for name, value in returned.items()}
+    outputs = {f"new_{name}": Sym.of(value).sx for name, value in returned.items() if not isinstance(value, Failure)}
     return ca.Function(
         "f", [s.sx for s in symbols.values()], list(outputs.values()), list(symbols), list(outputs)
     )  # fmt: skip

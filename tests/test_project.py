@@ -27,10 +27,10 @@ LAYERS: tuple[tuple[str, ...], ...] = (
     ("system",),
     ("solvers",),
     ("balance",),
-    ("result", "plotting", "schematic"),
+    ("result", "placement", "plotting", "schematic"),
     ("circuit",),
     ("__init__",),
-    ("cli", "commands"),
+    ("cli", "commands", "__main__"),
 )
 """Rooms of the kernel, lowest first. A module imports from its own layer and those above it in this list.
 

@@ -40,6 +40,7 @@ def facts(plan: Plan) -> dict[str, Any]:
     ]
     if netlist.sections.simulation.stop_when:
         events.append({"name": "stop_when", "kind": "stop"})
+    flexible = {name for name, i in plan.design.instances.items() if type(i.component).family}
     return {
         "title": netlist.sections.title or netlist.name, "circuit": netlist.name, "status": "done", "error": None,
         "components": {name: type(i.component).type_name() for name, i in plan.design.instances.items()},
@@ -48,7 +49,7 @@ def facts(plan: Plan) -> dict[str, Any]:
         "states": _names(plan, "states"), "held": _names(plan, "held"),
         "relations": sum(len(tr.relations) for tr in plan.traces.values()),
         "events": events,
-        "forms": {name: type(c).type_name() for name, c in plan.components.items() if type(c) is not type(plan.design.instances[name].component)},
+        "forms": {name: type(c).type_name() for name, c in plan.components.items() if name in flexible},
     }  # fmt: skip
 
 

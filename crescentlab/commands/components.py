@@ -146,7 +146,7 @@ def default(field: FieldInfo) -> str:
     """The default in an engineer's unit; ``required`` without one, nothing if it may be left out."""
     if field.is_required():
         return "required"
-    value, quantity = field.get_default(call_default_factory=True), field_quantity(field)  # type: ignore[call-arg]
+    value, quantity = field.get_default(call_default_factory=True), field_quantity(field)
     if value is None:
         return ""
     if isinstance(value, bool):

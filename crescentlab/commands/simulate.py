@@ -99,10 +99,11 @@ def report(result: Result, target: Path | None) -> dict[str, Any]:
     t, balance = result.trajectory, result.balance
     s = t.statistics
     return {
-        "status": t.status, "final_time": t.steps.t[-1], "wall_s": s.wall_s, "steps": s.steps, "evaluations": s.evaluations,
-        "jacobians": s.jacobians, "events": s.events, "ticks": s.ticks, "restarts": s.restarts,
-        "states": len(result.system.state_names), "balance": balance.as_json() if balance else None,
-        "warnings": list(t.warnings), "file": str(target) if target else None, "error": t.error or None,
+        "status": t.status, "final_time": t.steps.t[-1], "wall_s": s.wall_s, "steps": s.steps,
+        "evaluations": s.evaluations, "jacobians": s.jacobians, "events": s.events, "ticks": s.ticks,
+        "restarts": s.restarts, "states": len(result.system.state_names),
+        "balance": balance.as_json() if balance else None, "warnings": list(t.warnings),
+        "file": str(target) if target else None, "error": t.error or None,
     }  # fmt: skip
 
 
@@ -115,37 +116,12 @@ def _finite(value: Any) -> Any:
 
 def summary(result: Result, target: Path | None, record: list[str], pictures: list[Path]) -> str:
     """The run in a few lines, quantities in display units."""
-    t, s = result.trajectory, result.trajectory.statistics
-    time = QUANTITIES["time"]
-    end = time.show(t.steps.t[-1], result.display_unit(time))
-    work = [
-        counted(s.steps, "step"),
-        counted(s.evaluations, "evaluation"),
-        counted(s.jacobians, "Jacobian"),
-        counted(s.restarts, "restart"),
-    ]
-    rows = [
-        ("end", end if t.status == "done" else f"{end}, {t.status}"),
-        ("solver", f"{t.solver}: {', '.join(work)} in {s.wall_s:.3g} s"),
-        (
-            "model",
-            f"{counted(len(result.system.state_names), 'state')}; {counted(s.events, 'event')}, {counted(s.ticks, 'tick')}",
-        ),
-    ]
-    if result.balance is not None:
-        worst = max(result.balance.components.items(), key=lambda item: item[1])
-        rows.append(("balance", f"{result.balance.circuit:.1e} of the flow; at most {worst[1]:.1e}, {worst[0]}"))
-        merged = sum(result.balance.merged.values())
-        if merged:
-            rows.append(("merged", f"{QUANTITIES['volume'].show(merged, 'cm3', 3)} moved by events"))
-    parts = [result.title, table(rows, indent="  ")]
+    parts = [result.title, table(_facts(result), indent="  ")]
     if figures := _figures(result):
         more = len(result.net_pressures()) - MAX_NETS
-        parts.append(
-            table(figures, right=(2, 3, 4, 5), indent="  ")
-            + (f"\n  and {counted(more, 'net')} more" if more > 0 else "")
-        )
-    parts += [f"  warning: {warning}" for warning in t.warnings]
+        said = f"\n  and {counted(more, 'net')} more" if more > 0 else ""
+        parts.append(table(figures, right=(2, 3, 4, 5), indent="  ") + said)
+    parts += [f"  warning: {warning}" for warning in result.trajectory.warnings]
     written = [f"  wrote {path}" for path in pictures]
     if target is not None:
         names = counted(len(result.chosen(record)), "variable")
@@ -153,12 +129,32 @@ def summary(result: Result, target: Path | None, record: list[str], pictures: li
     return "\n\n".join([*parts, "\n".join(written)] if written else parts)
 
 
+def _facts(result: Result) -> list[tuple[str, str]]:
+    """What the run took."""
+    t, s = result.trajectory, result.trajectory.statistics
+    time, states = QUANTITIES["time"], len(result.system.state_names)
+    end = time.show(t.steps.t[-1], result.display_unit(time))
+    work = f"{counted(s.steps, 'step')}, {counted(s.evaluations, 'evaluation')}, {counted(s.jacobians, 'Jacobian')}"
+    rows = [
+        ("end", end if t.status == "done" else f"{end}, {t.status}"),
+        ("solver", f"{t.solver}: {work}, {counted(s.restarts, 'restart')} in {s.wall_s:.3g} s"),
+        ("model", "; ".join((counted(states, "state"), counted(s.events, "event"), counted(s.ticks, "tick")))),
+    ]
+    if result.balance is not None:
+        worst = max(result.balance.components.items(), key=lambda item: item[1])
+        rows.append(("balance", f"{result.balance.circuit:.1e} of the flow; at most {worst[1]:.1e}, {worst[0]}"))
+        merged = sum(result.balance.merged.values())
+        if merged:
+            rows.append(("merged", f"{QUANTITIES['volume'].show(merged, 'cm3', 3)} moved by events"))
+    return rows
+
+
 def _figures(result: Result) -> list[tuple[str, ...]]:
     """Outputs and net pressures: unit, last value, mean, least, largest."""
     names = [o.name for o in result.design.outputs if o.scope == ""] + result.net_pressures()[:MAX_NETS]
     columns = [n for name in names for n in result.elements(name)]
     result.load(names)
-    rows = [("", "", "end", "mean", "min", "max")] if columns else []
+    rows: list[tuple[str, ...]] = [("", "", "end", "mean", "min", "max")] if columns else []
     for name in columns:
         quantity, series = result.quantity(name), result[name]
         unit = result.display_unit(quantity)
