@@ -28,7 +28,9 @@ from crescentlab.graph import build
 from crescentlab.causality import plan
 from crescentlab.library import installed
 from crescentlab.netlist import Netlist
-from crescentlab.system import Prepared, System, assemble
+from crescentlab.assembly import assemble
+from crescentlab.prepared import Prepared
+from crescentlab.system import System
 
 SOLVERS = ("lsoda", "rk45", "dop853", "bdf", "radau")
 REVOLUTION = "30 ms"

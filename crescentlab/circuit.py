@@ -13,6 +13,7 @@ from importlib import resources
 from pathlib import Path
 from typing import Any, get_args
 
+from crescentlab.assembly import assemble
 from crescentlab.causality import Plan, plan
 from crescentlab.component import field_quantity
 from crescentlab.elaborate import Design, elaborate
@@ -23,7 +24,7 @@ from crescentlab.library import Library, installed
 from crescentlab.netlist import Netlist, SimulationSection
 from crescentlab.result import Result
 from crescentlab.solvers.loop import Options, integrate
-from crescentlab.system import System, assemble
+from crescentlab.system import System
 from crescentlab.trace import structure_of
 from crescentlab.units import QUANTITIES
 

@@ -29,7 +29,7 @@ import inspect
 import re
 import types
 import typing
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Hashable, Iterable
 from typing import Any, ClassVar, TypeAlias
 
 import numpy as np
@@ -74,7 +74,7 @@ class Component(BaseModel):
     @classmethod
     def declared(cls, kind: type[Declared]) -> list[Any]:
         """The class's ports, states, held values or observables, in the order written."""
-        return list(_declared(cls, kind))
+        return list(_declared(cls, typing.cast(Hashable, kind)))
 
     @classmethod
     def ports(cls) -> list[Port]:

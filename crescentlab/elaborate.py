@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -17,11 +17,12 @@ import numpy as np
 from crescentlab.component import Component, field_quantity, is_structural
 from crescentlab.domain import Held, Port, State
 from crescentlab.errors import ExpressionError, InputError, Place, UnitError, nearest
-from crescentlab.expressions import Value, evaluate, is_expression
+from crescentlab.expressions import Value, evaluate, is_expression, number_of
 from crescentlab.fluid import Fluid
 from crescentlab.library import Library
-from crescentlab.netlist import Netlist, NetSection, net_ports, validated
-from crescentlab.units import QUANTITIES, is_number, parse_any
+from crescentlab.explain import validated
+from crescentlab.netlist import Netlist, NetSection, net_ports
+from crescentlab.units import QUANTITIES, Quantity, is_number, parse_any
 from crescentlab.yaml_text import Node
 
 MAX_SUBCIRCUIT_DEPTH = 20
@@ -149,10 +150,11 @@ class _Elaboration:
     def fluids(self, netlist: Netlist, library: Library, overrides: _Overrides) -> dict[str, Fluid]:
         values = _parameter_values(netlist, {}, overrides, "")
         made: dict[str, Fluid] = {}
-        given = netlist.sections.fluids or ({"fluid": netlist.sections.fluid} if netlist.sections.fluid else {})
+        sections = netlist.sections
+        given = sections.fluids or ({"fluid": sections.fluid} if sections.fluid is not None else {})
         for name in given:
-            path = ("fluids", name) if netlist.sections.fluids else ("fluid",)
-            node = netlist.node.find(path)
+            path = ("fluids", name) if sections.fluids else ("fluid",)
+            node = replace(netlist.node.find(path), place=netlist.place(*path))
             assert isinstance(node.value, dict)
             if "type" not in node.value:
                 raise InputError("the fluid needs a type, for example fluid: {type: simple_oil}", node.place)
@@ -177,7 +179,7 @@ class _Elaboration:
         self.parameters[prefix] = values
         inner_ports: dict[str, dict[str, str]] = {}
         for name, section in sections.components.items():
-            node = netlist.node.find(("components", name))
+            node = replace(netlist.node.find(("components", name)), place=netlist.place("components", name))
             full = prefix + name
             if section.type.endswith((".yaml", ".yml")):
                 inner_ports[name] = self.subcircuit(
@@ -211,8 +213,7 @@ class _Elaboration:
         stateful = {s.name: s for form in cls.forms() for s in form.declared(State) + form.declared(Held)}
         start: dict[str, np.ndarray] = {}
         given = node.value["start"].value if isinstance(node.value, dict) and "start" in node.value else {}
-        if not isinstance(given, dict):
-            raise InputError(f"{full}: start needs keys, for example start: {{p: 1 bar}}", node.place_of("start"))
+        assert isinstance(given, dict)  # as the netlist checked
         for name in given:
             if name not in stateful:
                 raise InputError(
@@ -224,9 +225,12 @@ class _Elaboration:
             if source is not None:
                 quantity = instance.quantity(declared.quantity)
                 items = source.value if isinstance(source.value, list) else [source]
-                start[name] = np.array(
-                    [_number(str(i.value), quantity, lookup, f"{full}.start.{name}", i.place) for i in items]
-                )
+                subject = f"{'--set ' if text is not None else ''}{full}.start.{name}"
+                size = instance.size_of(declared.size)
+                if len(items) not in (1, size):
+                    said = f"{len(items)} values for {'a single one' if size is None else f'{size} elements'}"
+                    raise InputError(f"{subject}: {said}; write one value for all, or one for each", source.place)
+                start[name] = np.array([_number(str(i.value), quantity, lookup, subject, i.place) for i in items])
         self.instances[full] = Instance(full, instance, node.place, start)
 
     def subcircuit(
@@ -243,23 +247,32 @@ class _Elaboration:
         if len(chain) > MAX_SUBCIRCUIT_DEPTH:
             raise InputError(f"subcircuits nested deeper than {MAX_SUBCIRCUIT_DEPTH}", place)
         if not path.is_file():
-            raise InputError(f"the subcircuit {file} does not exist; it is looked for beside {netlist.name}", place)
-        part = self.parts.setdefault(str(key), Netlist.read(path))
+            raise InputError(f"the subcircuit {file} does not exist; it is looked for beside the file that names it", place)
+        if str(key) not in self.parts:
+            self.parts[str(key)] = Netlist.read(path)
+        part = self.parts[str(key)]
         if not part.sections.ports:
-            raise InputError(f"{file} has no ports: and cannot be used as a subcircuit", place)
+            raise InputError(f"{file} has no ports; give it some, for example ports: {{inlet: p_line}}", place)
         assert isinstance(node.value, dict)
         lookup = _scope_lookup(values, netlist)
         passed: dict[str, Value] = {}
         for name, child in node.value.items():
-            if name in ("type", "start"):
+            if name == "type":
                 continue
+            if name == "start":
+                raise InputError(
+                    f"{full}: a subcircuit has no states of its own; start its components in {file}, by parameters of it",
+                    node.place_of(name),
+                )
             if name not in part.sections.parameters:
                 raise InputError(
                     f"{full}: {file} has no parameter {name!r}: {nearest(name, part.sections.parameters)}",
                     node.place_of(name),
                 )
-            passed[name] = _value(str(child.value), lookup, f"{full}.{name}", child.place)
-        _check_passed(part, passed, node, full)
+            if not isinstance(child.value, str):
+                raise InputError(f"{full}.{name} must be one text, not a list or keys", node.place_of(name))
+            kind = _kind(part.sections.parameters[name])
+            passed[name] = _value(child.value, lookup, f"{full}.{name}", child.place, kind)
         self.scope(part, self.with_user_files(part, library), full + ".", passed, overrides, (*chain, key))
         for port, net in part.sections.ports.items():
             if net not in part.sections.nets:
@@ -339,21 +352,14 @@ class _Elaboration:
         return [net for name, net in self.nets.items() if root(name) == name]
 
 
-def _check_passed(part: Netlist, passed: dict[str, Value], node: Node, full: str) -> None:
-    """A value passed into a part must be of the kind of the part's own default."""
-    for name, value in passed.items():
-        default = part.sections.parameters[name]
-        if is_expression(default) or not is_number(default):
-            continue
-        try:
-            _, quantity = parse_any(default)
-        except UnitError:
-            continue
-        if isinstance(value.value, str) or value.dims != quantity.dims:
-            raise InputError(
-                f"{full}.{name}: this must be a {quantity.title}; write for example {name}: {quantity.example()}",
-                node.place_of(name),
-            )
+def _kind(default: str) -> Quantity | None:
+    """The quantity that a parameter's default shows; None for words, expressions, and what cannot be read."""
+    if is_expression(default) or not is_number(default):
+        return None
+    try:
+        return parse_any(default)[1]
+    except UnitError:
+        return None
 
 
 def _parameter_values(
@@ -374,8 +380,7 @@ def _parameter_values(
             place = netlist.place("parameters", name)
             text = overrides.take(prefix + name)
             if text is not None:
-                values[name] = _value(text, find, f"--set {prefix}{name}", COMMAND)
-                _same_kind(values[name], texts[name], f"--set {prefix}{name}")
+                values[name] = _value(text, find, f"--set {prefix}{name}", COMMAND, _kind(texts[name]))
             elif name in passed:
                 values[name] = passed[name]
             else:
@@ -388,17 +393,6 @@ def _parameter_values(
     return values
 
 
-def _same_kind(value: Value, default: str, subject: str) -> None:
-    if is_expression(default) or not is_number(default):
-        return
-    try:
-        _, quantity = parse_any(default)
-    except UnitError:
-        return
-    if isinstance(value.value, str) or value.dims != quantity.dims:
-        raise InputError(f"{subject}: this must be a {quantity.title}; write for example {quantity.example()}")
-
-
 def _scope_lookup(values: Mapping[str, Value], netlist: Netlist) -> Any:
     def find(name: str) -> Value:
         if name not in values:
@@ -408,14 +402,17 @@ def _scope_lookup(values: Mapping[str, Value], netlist: Netlist) -> Any:
     return find
 
 
-def _value(text: str, lookup: Any, subject: str, place: Place | None) -> Value:
-    """A parameter's text as a value: expression, number with unit, or word."""
+def _value(text: str, lookup: Any, subject: str, place: Place | None, kind: Quantity | None = None) -> Value:
+    """A parameter's text as a value: expression, number with unit, or word; of ``kind`` if that is known."""
     try:
         if is_expression(text):
-            return evaluate(text, lookup)
+            value = evaluate(text, lookup)
+            return value if kind is None else Value(number_of(value, kind), kind)
+        if kind is not None:
+            return Value(kind.parse(text), kind, written=True)
         if is_number(text):
             number, quantity = parse_any(text)
-            return Value(number, quantity)
+            return Value(number, quantity, written=True)
         return Value(text)
     except InputError as error:
         raise _described(error, subject, place) from None
@@ -432,11 +429,7 @@ def _number(text: str, quantity: Any, lookup: Any, subject: str, place: Place | 
     try:
         if is_expression(text):
             value = evaluate(text, lookup)
-            if isinstance(value.value, str) or value.dims != quantity.dims:
-                raise ExpressionError(
-                    f"the expression gives {value.quantity.title} [{value.quantity.si}], not {quantity.title} [{quantity.si}]"
-                )
-            return float(value.value)
+            return number_of(value, quantity)
         return float(quantity.parse(text))
     except InputError as error:
         raise _described(error, subject, place) from None
@@ -470,9 +463,8 @@ def _instance(
     try:
         return validated(cls, node, data, context={"folder": str(folder)}, subject=subject)
     except InputError as error:
-        hit = next((n for n in from_command if f"{subject}: {n}:" in error.message), None)
-        if hit:
-            raise type(error)(f"--set {full}.{hit}: {error.message.removeprefix(f'{subject}: {hit}: ')}") from None
+        if any(re.match(rf"{re.escape(f'{subject}.{name}')}\b", error.message) for name in from_command):
+            raise type(error)(f"--set {error.message}") from None
         raise
 
 
@@ -494,17 +486,9 @@ def _plain(node: Node, info: Any, lookup: Any, subject: str) -> Any:
             # a number whose quantity the component itself decides: its reader wants the unit
             return f"{float(value.value)!r} {value.quantity.si if value.quantity.name != 'ratio' else ''}".strip()
         if quantity is None:
-            if value.dims != QUANTITIES["ratio"].dims:
-                raise ExpressionError(
-                    f"the expression gives {value.quantity.title} [{value.quantity.si}], where a plain number or word belongs"
-                )
-            number = float(value.value)
+            number = number_of(value, QUANTITIES["ratio"])
             return int(number) if number.is_integer() else number
-        if value.dims != quantity.dims:
-            raise ExpressionError(
-                f"the expression gives {value.quantity.title} [{value.quantity.si}], not {quantity.title} [{quantity.si}]"
-            )
-        return float(value.value)
+        return number_of(value, quantity)
     except InputError as error:
         raise _described(error, subject, node.place) from None
 

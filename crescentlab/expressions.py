@@ -25,6 +25,7 @@ from crescentlab.symbols import Condition, Sym
 from crescentlab.units import NO_DIMS, QUANTITIES, Dims, Quantity, parse_any, quantity_with, ratio, si_unit
 
 MAX_LENGTH = 2000
+MAX_DEPTH = 150
 
 
 @dataclass(frozen=True)
@@ -33,6 +34,8 @@ class Value:
 
     value: Any
     quantity: Quantity = ratio
+    written: bool = False
+    """A number just as the user wrote it, so that its unit says what it is: 50 Hz is no speed."""
 
     @property
     def dims(self) -> Dims:
@@ -55,6 +58,7 @@ def evaluate(text: str, lookup: Lookup) -> Value:
     """
     body = text.removeprefix("=").strip()
     tree, literals = _parse(body)
+    shown = _shown(body)
 
     def find(name: str) -> Value:
         if name in literals:
@@ -66,14 +70,26 @@ def evaluate(text: str, lookup: Lookup) -> Value:
     try:
         result = _Walker(body, find).visit(tree)
     except ZeroDivisionError:
-        raise ExpressionError(f"{body!r} divides by zero") from None
+        raise ExpressionError(f"{shown} divides by zero") from None
     except (OverflowError, FloatingPointError):
-        raise ExpressionError(f"{body!r} is too large to compute") from None
+        raise ExpressionError(f"{shown} is too large to compute") from None
     except ValueError as error:
-        raise ExpressionError(f"{body!r} cannot be computed: {error}") from None
+        raise ExpressionError(f"{shown} cannot be computed: {error}") from None
     if isinstance(result.value, (float, int, np.ndarray)) and not np.all(np.isfinite(result.value)):
-        raise ExpressionError(f"{body!r} is not a finite number")
+        raise ExpressionError(f"{shown} is not a finite number")
     return result
+
+
+def number_of(value: Value, quantity: Quantity) -> float:
+    """The SI number of an expression that must give ``quantity``."""
+    if isinstance(value.value, (str, bool, np.bool_)):
+        raise ExpressionError(f"the expression gives {_title(value)}, where {_title(Value(0.0, quantity))} belongs")
+    if value.dims != quantity.dims or (value.written and value.quantity.si != quantity.si):
+        raise ExpressionError(
+            f"the expression gives {_title(value)}, where {_title(Value(0.0, quantity))} belongs; "
+            f"a number of it is written like {quantity.example()}"
+        )
+    return float(value.value)
 
 
 def names_in(text: str) -> set[str]:
@@ -114,7 +130,7 @@ def _parse(body: str) -> tuple[ast.expr, dict[str, Value]]:
 
     def keep(match: re.Match[str]) -> str:
         value, quantity = parse_any(match[0])
-        literals[name := f"_literal{len(literals)}_"] = Value(value, quantity)
+        literals[name := f"_literal{len(literals)}_"] = Value(value, quantity, written=True)
         return f" {name} "
 
     try:
@@ -125,7 +141,7 @@ def _parse(body: str) -> tuple[ast.expr, dict[str, Value]]:
     except (SyntaxError, ValueError, RecursionError, MemoryError):
         hint = " (powers are written with **)" if "^" in body else ""
         raise ExpressionError(
-            f"{body!r} is not an expression{hint}; write arithmetic with parameters, for example = pi / 4 * d**2"
+            f"{_shown(body)} is not an expression{hint}; write arithmetic with parameters, for example = pi / 4 * d**2"
         ) from None
 
 
@@ -142,7 +158,7 @@ def _power(base: Any, exponent: float) -> Any:
     if isinstance(base, Sym) or isinstance(base, np.ndarray):
         return base ** (int(exponent) if float(exponent).is_integer() else exponent)
     if base < 0 and not float(exponent).is_integer():
-        raise ExpressionError(f"a negative number ({base:g}) to the power {exponent:g} is not a real number")
+        raise ExpressionError(f"a negative number, {base:g}, to the power {exponent:g} is not a real number")
     return float(base) ** float(exponent)
 
 
@@ -156,7 +172,7 @@ _PLAIN = {"sin": maths.sin, "cos": maths.cos, "tan": maths.tan, "asin": maths.as
           "exp": maths.exp, "log": maths.log, "tanh": maths.tanh, "sinh": maths.sinh, "cosh": maths.cosh}  # fmt: skip
 _WHOLE: dict[str, Callable[[float], float]] = {"floor": math.floor, "ceil": math.ceil, "round": lambda x: round(x)}
 _SAME = {"min": maths.minimum, "max": maths.maximum}
-_REDUCE: dict[str, Callable[[Any], Any]] = {"sum": maths.total, "mean": lambda v: maths.total(v) / len(v)}
+_REDUCE: dict[str, Callable[[Any], Any]] = {"sum": maths.total, "mean": lambda v: maths.total(v) / len(v) if getattr(v, "shape", ()) else v}
 FUNCTIONS = sorted([*_PLAIN, *_WHOLE, *_SAME, *_REDUCE, "abs", "sqrt", "where", "involute", "atan2"])
 _COMPARE: dict[type[ast.cmpop], Callable[[Any, Any], Any]] = {
     ast.Lt: operator.lt,
@@ -171,11 +187,20 @@ class _Walker:
 
     def __init__(self, body: str, find: Lookup) -> None:
         self.body, self.find = body, find
+        self.depth = 0
 
     def fail(self, message: str) -> ExpressionError:
-        return ExpressionError(f"{self.body!r}: {message}")
+        return ExpressionError(f"{_shown(self.body)}: {message}")
 
     def visit(self, node: ast.expr) -> Value:
+        self.depth += 1
+        if self.depth > MAX_DEPTH:
+            raise self.fail(f"more than {MAX_DEPTH} operations inside one another; name parts of it as parameters")
+        value = self.value(node)
+        self.depth -= 1
+        return value
+
+    def value(self, node: ast.expr) -> Value:
         name = _dotted(node)
         if name is not None:
             return self.find(name)
@@ -199,8 +224,8 @@ class _Walker:
 
     def number(self, node: ast.expr) -> Value:
         value = self.visit(node)
-        if isinstance(value.value, str):
-            raise self.fail(f"{value.value!r} is a word, not a number")
+        if isinstance(value.value, (str, bool, np.bool_, Condition)):
+            raise self.fail(f"{_title(value)} stands where a number belongs")
         return value
 
     def binary(self, node: ast.BinOp) -> Value:
@@ -220,7 +245,7 @@ class _Walker:
                 raise self.fail("an exponent must be a plain number")
             dims = tuple(d * Fraction(right.value).limit_denominator(12) for d in left.dims)
             return Value(_power(left.value, float(right.value)), _quantity(dims))
-        raise self.fail("write + - * / ** only")
+        raise self.fail("write + - * / ** only" + (", ** for a power" if isinstance(node.op, ast.BitXor) else ""))
 
     def alike(self, left: Value, right: Value, verb: str) -> tuple[Value, Value]:
         if left.dims == right.dims:
@@ -231,18 +256,24 @@ class _Walker:
         raise self.fail(f"cannot {verb} {_title(left)} and {_title(right)}")
 
     def boolean(self, node: ast.BoolOp) -> Value:
-        values = [self.visit(v).value for v in node.values]
+        values = [self.condition(v) for v in node.values]
         result = values[0]
         for value in values[1:]:
             result = result & value if isinstance(node.op, ast.And) else result | value
         return Value(result)
+
+    def condition(self, node: ast.expr) -> Any:
+        value = self.visit(node)
+        if not isinstance(value.value, (bool, np.bool_, Condition)):
+            raise self.fail(f"{_title(value)} stands where a condition such as a > b belongs")
+        return value.value
 
     def call(self, name: str, arguments: list[ast.expr]) -> Value:
         if name not in FUNCTIONS:
             raise self.fail(f"unknown function {name!r}: {nearest(name, FUNCTIONS)}")
         if name == "where" and len(arguments) == 3:
             a, b = self.alike(self.number(arguments[1]), self.number(arguments[2]), "choose between")
-            return Value(maths.where(self.visit(arguments[0]).value, a.value, b.value), a.quantity)
+            return Value(_float(maths.where(self.condition(arguments[0]), a.value, b.value)), a.quantity)
         values = [self.number(a) for a in arguments]
         if name in _SAME and len(values) >= 2:
             result = values[0]
@@ -306,8 +337,19 @@ def _float(value: Any) -> Any:
     return value if isinstance(value, (Sym, Condition, np.ndarray)) else float(value)
 
 
+def _shown(body: str) -> str:
+    """The expression as messages show it, cut if it is long."""
+    return repr(body if len(body) <= 120 else f"{body[:100]} ...")
+
+
 def _title(value: Value) -> str:
-    return "a pure number" if value.quantity is ratio else f"a {value.quantity.title} [{value.quantity.si}]"
+    if isinstance(value.value, str):
+        return f"the word {value.value!r}"
+    if isinstance(value.value, (bool, np.bool_, Condition)):
+        return "a condition"
+    if value.quantity is ratio:
+        return "a pure number"
+    return f"{value.quantity.titled} [{value.quantity.si}]" if value.quantity.name in QUANTITIES else f"a value in {value.quantity.si}"
 
 
 def _combine(a: Dims, b: Dims, sign: int) -> Quantity:

@@ -10,25 +10,37 @@ import keyword
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Annotated, Any, Literal, TypeVar
+from typing import Annotated, Any, Literal
 
-from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Field, ValidationError
+from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Field, model_validator
 
-from crescentlab.component import field_quantity
 from crescentlab.errors import InputError, Place, UnitError, nearest
+from crescentlab.explain import validated
 from crescentlab.units import QUANTITIES, Time
-from crescentlab.yaml_text import Node, quoted, read
+from crescentlab.yaml_text import Node, read
 
 
 def _no_keyword(name: str) -> str:
     for word in name.split("."):
-        if keyword.iskeyword(word):
+        if keyword.iskeyword(word) or word == "pi":
             raise ValueError(f"{word!r} has a meaning of its own in expressions; choose another name")
     return name
 
 
+def _not_time(name: str) -> str:
+    if name == "time":
+        raise ValueError("'time' is the first column of every result; choose another name")
+    return name
+
+
 Name = Annotated[str, Field(pattern=r"^[A-Za-z_]\w*$"), AfterValidator(_no_keyword)]
-OutputName = Annotated[str, Field(pattern=r"^[A-Za-z_]\w*(\.[A-Za-z_]\w*)?$"), AfterValidator(_no_keyword)]
+OutputName = Annotated[
+    str, Field(pattern=r"^[A-Za-z_]\w*(\.[A-Za-z_]\w*)?$"), AfterValidator(_no_keyword), AfterValidator(_not_time)
+]
+
+
+SMALLEST_RTOL = 1e-13
+"""Below this, rounding spoils what a solver compares."""
 
 
 def _one_or_many(value: Any) -> Any:
@@ -62,7 +74,7 @@ class SimulationSection(_Section):
     solver: Literal["auto", "lsoda", "bdf", "radau", "rk45", "dop853"] = Field(
         default="auto", description="integration method"
     )
-    rtol: float = Field(default=1e-6, gt=0, lt=1, description="relative tolerance of every state")
+    rtol: float = Field(default=1e-6, ge=SMALLEST_RTOL, lt=1, description="relative tolerance of every state")
     max_step: Time | None = Field(
         default=None, gt=0, description="longest step; default from the circuit's own time scales"
     )
@@ -78,6 +90,12 @@ class PlotSection(_Section):
     title: str | None = Field(default=None, description="title")
     start: Time | None = Field(default=None, ge=0, description="first time shown")
     stop: Time | None = Field(default=None, gt=0, description="last time shown")
+
+    @model_validator(mode="after")
+    def _in_order(self) -> PlotSection:
+        if self.start is not None and self.stop is not None and self.start >= self.stop:
+            raise ValueError("start must lie before stop")
+        return self
 
 
 class CircuitFile(_Section):
@@ -127,6 +145,8 @@ class Netlist:
             raise InputError("the format version is missing; begin the file with `crescentlab: 1`", node.place)
         _collections(node)
         sections = validated(CircuitFile, node)
+        if not sections.components:
+            raise InputError("there are no components; list them, for example components: {tank: {type: tank}}", node.place_of("components"))
         if sections.fluid is not None and sections.fluids:
             raise InputError("write either fluid: or fluids:, not both", node.place_of("fluids"))
         if sections.ports and sections.simulation.stop_when:
@@ -157,21 +177,31 @@ def _collections(node: Node) -> None:
     assert isinstance(node.value, dict)
     for key, (kind, example) in _KINDS.items():
         child = node.value.get(key)
-        if child is not None and not isinstance(child.value, kind):
-            if child.value == "":
-                child.value = kind()
-                continue
-            raise InputError(
-                f"{key}: needs {'keys' if kind is dict else 'a list'}, for example {key}: {example}", node.place_of(key)
-            )
-    components = node.value.get("components")
-    if components is not None and isinstance(components.value, dict):
-        for name, child in components.value.items():
-            if not isinstance(child.value, dict):
-                raise InputError(
-                    f"component {name!r} needs keys, for example {name}: {{type: orifice, area: 5 mm^2}}",
-                    components.place_of(name),
-                )
+        if child is not None and child.value == "":
+            child.value = kind()
+        _shaped(node, (key,), kind, example)
+    for name in _keys(node, "components"):
+        _shaped(node, ("components", name), dict, "{type: orifice, area: 5 mm^2}")
+        _shaped(node, ("components", name, "start"), dict, "{p: 1 bar}")
+    for name in _keys(node, "nets"):
+        if not isinstance(node.find(("nets", name)).value, dict):
+            _shaped(node, ("nets", name), list, "[pump.port, line.port]")
+    for name in _keys(node, "fluids"):
+        _shaped(node, ("fluids", name), dict, "{type: simple_oil, density: 860 kg/m^3}")
+
+
+def _keys(node: Node, section: str) -> list[str]:
+    value = node.find((section,)).value
+    return list(value) if isinstance(node.value, dict) and section in node.value and isinstance(value, dict) else []
+
+
+def _shaped(node: Node, path: tuple[str, ...], kind: type, example: str) -> None:
+    """Refuse what stands at ``path`` (if anything does) unless it has keys (dict) or items (list)."""
+    parent = node.find(path[:-1]).value
+    if not isinstance(parent, dict) or path[-1] not in parent or isinstance(parent[path[-1]].value, kind):
+        return
+    needs = "keys" if kind is dict else "a list"
+    raise InputError(f"{path[-1]} needs {needs}, for example {path[-1]}: {example}", node.place_of(*path))
 
 
 def _namespace(sections: CircuitFile, node: Node) -> None:
@@ -193,71 +223,9 @@ def _check_display(sections: CircuitFile, node: Node) -> None:
         try:
             QUANTITIES[quantity].factor(unit)
         except UnitError as error:
-            raise error.at(place) from None
-
-
-M = TypeVar("M", bound=BaseModel)
-
-
-def validated(model: type[M], node: Node, data: Any = None, *, context: Any = None, subject: str = "") -> M:
-    """``model`` from the node's text (or ``data``); the first error becomes one sentence at its line."""
-    try:
-        return model.model_validate(node.plain() if data is None else data, context=context)
-    except ValidationError as error:
-        raise explain(model, error, node, subject) from None
-
-
-def explain(model: type[BaseModel], error: ValidationError, node: Node, subject: str) -> InputError:
-    """Turn the first of pydantic's errors into a sentence that says where, what, and what to write."""
-    details = error.errors()[0]
-    path = [step for step in details["loc"] if step != "[key]"]
-    key = str(path[-1]) if path else ""
-    kind, said = details["type"], details["msg"]
-    place = node.place_of(*path) or node.place
-    where = f"{subject}: " if subject else ""
-    if kind == "extra_forbidden":
-        known = _fields_at(model, path[:-1])
-        return InputError(f"{where}unknown key {key!r}: {nearest(key, known)}", place)
-    if kind == "missing":
-        return InputError(f"{where}{key} is missing{_example(model, key)}", node.find(path[:-1]).place or node.place)
-    given = details.get("input")
-    value = f" {given!r}" if isinstance(given, (str, int, float)) else ""
-    if kind in ("unit", "curve", "value_error"):
-        said = said.removeprefix("Value error, ")
-        return InputError(f"{where}{key + ': ' if key else ''}{said}", place)
-    if kind == "string_pattern_mismatch":
-        return InputError(f"{where}{key!r} is not a name; use letters, digits and _, beginning with a letter", place)
-    if kind in ("float_parsing", "float_type") and isinstance(given, str):
-        return InputError(f"{where}{key}: {given!r} is not a number", place)
-    return InputError(
-        f"{where}{key + ': ' if key else ''}{said[0].lower() + said[1:]}{', not' + value if value else ''}", place
-    )
-
-
-def _fields_at(model: type[BaseModel], path: list[Any]) -> list[str]:
-    """Field names of the section at ``path``, for offering the nearest."""
-    if path and path[0] == "simulation":
-        return list(SimulationSection.model_fields)
-    if path and path[0] == "plots":
-        return list(PlotSection.model_fields)
-    if path and path[0] == "nets":
-        return list(NetSection.model_fields)
-    return [info.alias or name for name, info in model.model_fields.items()]
-
-
-def _example(model: type[BaseModel], key: str) -> str:
-    field = next((info for name, info in model.model_fields.items() if key in (name, info.alias)), None)
-    quantity = field_quantity(field) if field is not None else None
-    if quantity is not None:
-        return f"; write for example {key}: {quantity.example()}"
-    return f"; write for example {key}: orifice" if key == "type" else ""
+            raise InputError(f"display.{quantity}: {error.message}", place) from None
 
 
 def net_ports(section: list[str] | NetSection) -> list[str]:
     """The ports a net lists, in either form."""
     return section.ports if isinstance(section, NetSection) else section
-
-
-def corrected(text: str) -> str:
-    """A reference as it must be quoted inside brackets."""
-    return quoted(f"[{text}]")[1:-1]

@@ -167,6 +167,14 @@ def broadcast(a: Shape, b: Shape) -> Shape:
     raise ValueError(f"vectors of {a[0]} and {b[0]} elements do not combine")
 
 
+def column(items: list[ca.SX]) -> ca.SX:
+    """CasADi columns one below the other; empty ones vanish."""
+    if len(items) == 1:
+        return items[0]
+    filled = [i for i in items if i.numel()]
+    return ca.vertcat(*filled) if filled else ca.SX(0, 1)
+
+
 def concatenate(parts: list[Sym]) -> Sym:
     """Scalars and vectors one after another as one vector."""
     columns = [p.sx for p in parts if p.shape != (0,)]

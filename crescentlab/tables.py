@@ -71,15 +71,17 @@ class CurveOf:
             if isinstance(value, str):
                 folder = Path((info.context or {}).get("folder", "."))
                 return read_csv(folder / value, self.x, self.y)
-            if isinstance(value, dict) and set(value) == {"x", "y"}:
+            if isinstance(value, dict) and {"x", "y"} <= set(value) <= set(Curve.model_fields):
                 xs, x_quantity = _column(value["x"], self.x, "x")
                 ys, y_quantity = _column(value["y"], self.y, "y")
                 return _curve(xs, ys, x_quantity, y_quantity)
         except InputError as error:
-            raise PydanticCustomError("curve", "{reason}", {"reason": str(error)}) from None
-        if isinstance(value, (Curve, dict)):
+            at = {"file": error.place.file, "line": error.place.line} if error.place else {}
+            raise PydanticCustomError("curve", "{reason}", {"reason": error.message, **at}) from None
+        if isinstance(value, Curve):
             return value
-        raise PydanticCustomError("curve", "write a CSV file's name, or {{x: [0 bar, 1 bar], y: [0 mm, 2 mm]}}")
+        said = "write a CSV file's name, or {x: [0 bar, 1 bar], y: [0 mm, 2 mm]}"
+        raise PydanticCustomError("curve", "{reason}", {"reason": said})
 
 
 def _column(items: Any, quantity: Quantity | None, name: str) -> tuple[list[float], Quantity]:

@@ -21,7 +21,7 @@ from crescentlab.domain import HYDRAULIC, Held, Observable, State
 from crescentlab.errors import ComponentError
 from crescentlab.fluid import Fluid
 from crescentlab.maths import TRACER, Event, Failure, Tick
-from crescentlab.symbols import Condition, Equality, Relation, Sym, as_condition, parts
+from crescentlab.symbols import Condition, Equality, Relation, Sym, as_condition, column, parts
 from crescentlab.units import Quantity
 
 Slot = tuple[str, int | None]
@@ -284,8 +284,8 @@ class _Tracing:
         return Trace(
             self.cls, self.states, self.held, self.inputs, self.outputs, self.observables, self.parameters, self.fluid_names,
             tuple(self.groups(y, function)), function("der", derivative), function("obs", observable), tuple(infos),
-            function("rel", ca.horzcat(_cat(relations), _cat(scales))), tuple(events), function("cond", _cat(conditions)),
-            function("period", _cat(periods)), function("clock", clock),
+            function("rel", ca.horzcat(column(relations), column(scales))), tuple(events), function("cond", column(conditions)),
+            function("period", column(periods)), function("clock", clock),
         )  # fmt: skip
 
     @staticmethod
@@ -302,7 +302,7 @@ class _Tracing:
             if value.shape != (() if n is None else (n,)):
                 raise self.fail(f"{name} has shape {value.shape}, its declaration says {() if n is None else (n,)}")
             parts_.append(value.sx)
-        return _cat(parts_)
+        return column(parts_)
 
     def groups(self, y: ca.SX, function: Any) -> Iterable[Group]:
         """Port outputs grouped by the port inputs in their sparsity."""
@@ -311,8 +311,8 @@ class _Tracing:
         pattern = ca.jacobian_sparsity(y, self.u) if self.u.numel() else ca.Sparsity(y.numel(), 0)
         rows, columns = pattern.get_triplet()
         needs: dict[int, list[int]] = {k: [] for k in range(y.numel())}
-        for row, column in zip(rows, columns, strict=True):
-            needs[row].append(column)
+        for row, place in zip(rows, columns, strict=True):
+            needs[row].append(place)
         by_need: dict[tuple[int, ...], list[int]] = {}
         for k, need in needs.items():
             by_need.setdefault(tuple(sorted(need)), []).append(k)
@@ -352,11 +352,6 @@ class _Tracing:
             if isinstance(value, Condition):
                 values[name] = Sym(value.lower(), value.shape)
         return ca.vertcat(self.column(values, self.states), self.column(values, self.held))
-
-
-def _cat(items: list[ca.SX]) -> ca.SX:
-    filled = [i for i in items if i.numel()]
-    return ca.vertcat(*filled) if filled else ca.SX(0, 1)
 
 
 def _text(relation: Relation) -> str:
@@ -401,7 +396,7 @@ def _time_only(value: ca.SX, t: ca.SX, others: ca.SX) -> ca.SX:
                 expressions[outs[0]] = (
                     ca.SX.unary(op, values[0]) if len(values) == 1 else ca.SX.binary(op, values[0], values[1])
                 )
-    return _cat(found)
+    return column(found)
 
 
 def quantities(component: Component, kind: type[State] | type[Held] | type[Observable]) -> dict[str, Quantity]:

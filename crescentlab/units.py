@@ -304,17 +304,15 @@ def quantity_named(name: str) -> Quantity:
 
 
 def parse_any(text: str) -> tuple[float, Quantity]:
-    """Read a number with a unit of whichever quantity owns it; a unit that two read differently is refused."""
+    """Read a number with a unit of whichever quantity owns it (the first listed, if several do)."""
     _, unit = _split(text)
     key = normalise(unit)
     owners = [q for q in QUANTITIES.values() if key in q.units]
     if not owners:
         known = [u for q in QUANTITIES.values() for u in q.units if u]
         raise UnitError(f"{text!r}: unknown unit {unit!r}: {nearest(key, known, otherwise=f'units are {COMMON} and the like')}")
-    if len({q.units[key] for q in owners}) > 1:
-        said = " or ".join(q.titled for q in owners)
-        raise UnitError(f"{text!r} may be {said}; write {' or '.join(next(iter(q.units)) for q in owners)}")
-    return owners[0].parse(text), owners[0]
+    owner = speed if speed in owners else owners[0]  # 1/min is a speed, not a frequency
+    return owner.parse(text), owner
 
 
 def is_number(text: str) -> bool:

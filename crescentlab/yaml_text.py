@@ -286,5 +286,7 @@ class _Builder:
         if better != line:
             raise InputError(f"{MUST_QUOTE}: {better.strip()}", place)
         before, node = next(reversed(parent.items()), ("", Node("")))
-        hint = f", or quote text that holds a comma: {before}: '{node.value}, {key}'" if isinstance(node.value, str) and before else ""
+        hint = ""
+        if isinstance(node.value, str) and before and not line[: event.start_mark.column].rstrip().endswith(":"):
+            hint = f", or quote text that holds a comma: {before}: '{node.value}, {key}'"
         raise InputError(f"{key!r} has no value; write {key}: ...{hint}", place)

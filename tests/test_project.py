@@ -18,13 +18,14 @@ import pytest
 ROOT = Path(__file__).resolve().parents[1]
 
 LAYERS: tuple[tuple[str, ...], ...] = (
-    ("errors", "symbols", "units", "maths"),
+    ("errors", "symbols", "units", "maths", "prepared"),
     ("tables", "fluid", "domain", "component"),
     ("expressions", "yaml_text", "library", "netlist"),
     ("elaborate",),
     ("graph", "trace"),
     ("causality",),
     ("system",),
+    ("assembly",),
     ("solvers",),
     ("balance",),
     ("result", "placement", "plotting", "schematic"),

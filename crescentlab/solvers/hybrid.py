@@ -13,7 +13,8 @@ from collections import deque
 import numpy as np
 
 from crescentlab.errors import SimulationError
-from crescentlab.system import Evaluator, System, Values
+from crescentlab.prepared import Evaluator
+from crescentlab.system import System, Values
 from crescentlab.units import DISPLAY
 
 EPS = float(np.finfo(float).eps)

@@ -180,7 +180,7 @@ class _Run:
             if high >= goal - self.hybrid.time_tolerance:
                 return self.at_goal(goal, x_high)
             self.record(high, x_high)
-            t, x = high, x_high
+            t = high
             self.report(t)
 
     def cap(self) -> float:
@@ -310,9 +310,27 @@ class _Run:
                 raise SimulationError(f"the step size collapsed to {high - low:.2g} s; {self.blame(high, x)}")
         else:
             self.tiny = 0
-        warning = self.limits.check(high, x, self.hybrid.h)
+        try:
+            warning = self.limits.check(high, x, self.hybrid.h)
+        except SimulationError:
+            self.keep_possible(low, high)
+            raise
         if warning and warning not in self.warnings:
             self.warnings.append(warning)
+
+    def keep_possible(self, low: float, high: float) -> None:
+        """Record the last instant of a step at which all pressures were possible."""
+        path = self.stepper.interpolant()
+        a, b = low, high
+        for _ in range(60):
+            middle = (a + b) / 2
+            try:
+                self.limits.check(middle, np.array(path(middle)), self.hybrid.h)
+                a = middle
+            except SimulationError:
+                b = middle
+        self.fill(low, a)
+        self.record(a, np.array(path(a)))
 
     def check_finite(self, t: float, x: np.ndarray, values: np.ndarray, when: str) -> None:
         bad = np.flatnonzero(~np.isfinite(values))

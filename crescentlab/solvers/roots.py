@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from itertools import pairwise
 
+import casadi as ca
 import numpy as np
 from scipy.optimize import brentq
 
 from crescentlab.solvers.hybrid import EPS, Hybrid
+from crescentlab.system import System
 
 _S = np.linspace(0.0, 1.0, 17)[1:-1]
 _H00, _H10 = 2 * _S**3 - 3 * _S**2 + 1, _S**3 - 2 * _S**2 + _S
@@ -27,6 +30,8 @@ class RootFinder:
         """+1 where a watched bit is true, -1 where it is false."""
         self.before = np.zeros(self.watched.size)
         self.slope = np.zeros(self.watched.size)
+        self.waves = np.flatnonzero(np.isin(self.watched, waves(hybrid.system)))
+        """Those that may swing several times within a step, and are searched in every one."""
 
     def read(self, t: float, x: np.ndarray, rate: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Distances of the watched relations from turning, their rates, and roundoff."""
@@ -57,9 +62,9 @@ class RootFinder:
         turning = (self.slope < 0) & (slope > 0)
         if np.count_nonzero(turning):
             turning = self.dips(turning & (self.before > band) & ~suspects, after, slope, high - low)
-        if np.count_nonzero(suspects) or np.count_nonzero(turning):
+        if self.waves.size or np.count_nonzero(suspects) or np.count_nonzero(turning):
             path = interpolant()
-            places = np.flatnonzero(suspects | turning)
+            places = np.union1d(np.flatnonzero(suspects | turning), self.waves)
             found = [r for k in places if (r := self.course(int(k), path).first_root(low, high)) is not None]
             if found:
                 return min(found)
@@ -79,6 +84,27 @@ class RootFinder:
     def course(self, k: int, path: Interpolant) -> _Course:
         """The k-th watched relation along ``path``."""
         return _Course(self.hybrid, int(self.watched[k]), float(self.side[k]), path)
+
+
+PERIODIC = (ca.OP_SIN, ca.OP_COS, ca.OP_TAN, ca.OP_FMOD)
+
+
+def waves(system: System) -> list[int]:
+    """Relations with a periodic function of the states, such as the teeth of a wheel: cos(z phi) > 0.9."""
+    walk = ca.Function("walk", system.arguments, [system.relations])
+    depends: dict[int, int] = {}  # by register: 0 on no state, 1 on states, 2 periodically
+    found: list[int] = []
+    for k in range(walk.n_instructions()):
+        op, ins, outs = walk.instruction_id(k), walk.instruction_input(k), walk.instruction_output(k)
+        if op == ca.OP_INPUT:
+            depends[outs[0]] = int(ins[0] == 1)
+        elif op == ca.OP_OUTPUT:
+            if depends[ins[0]] == 2:
+                found.append(outs[1])
+        else:
+            most = max((depends[i] for i in ins), default=0)
+            depends[outs[0]] = 2 if most and op in PERIODIC else most
+    return found
 
 
 class _Course:
@@ -105,18 +131,16 @@ class _Course:
 
     def first_root(self, low: float, high: float) -> float | None:
         """When it first turns in (low, high], as closely as the clock allows; at ``low`` it has been settled."""
-        times = np.concatenate(([low], low + _S * (high - low), [high]))
-        values = np.array([self.value(t) for t in times])
-        wrong = np.flatnonzero(values[1:] < 0)
-        if wrong.size:
-            j = int(wrong[0])
-            return self.close(float(times[j]), float(times[j + 1]), low, high)
-        j = int(np.argmin(values))
-        before, after = float(times[max(j - 1, 0)]), float(times[min(j + 1, times.size - 1)])
-        if not self.slope(before) < 0 < self.slope(after):
-            return None
-        bottom = float(brentq(self.slope, before, after, xtol=self.tolerance, rtol=4 * EPS))
-        return self.close(before, bottom, low, high) if self.value(bottom) < 0 else None
+        times = np.concatenate(([low], low + _S * (high - low), [high])).tolist()
+        values, slopes = [self.value(t) for t in times], [self.slope(t) for t in times]
+        for j, (start, end) in enumerate(pairwise(times)):
+            if values[j + 1] < 0:
+                return self.close(start, end, low, high)
+            if slopes[j] < 0 < slopes[j + 1]:
+                bottom = float(brentq(self.slope, start, end, xtol=self.tolerance, rtol=4 * EPS))
+                if self.value(bottom) < 0:
+                    return self.close(start, bottom, low, high)
+        return None
 
     def close(self, low: float, high: float, start: float, end: float) -> float | None:
         """The root between ``low``, where it is on its side or just leaving it, and ``high``, where it is not.
