@@ -85,7 +85,9 @@ class _Assembly:
         derivative = column(
             [self.call(n, tr.derivative, self.inputs[n]) for n, tr in plan.traces.items() if tr.states.size]
         )
-        clock = column([self.call(n, tr.clock, self.inputs[n]) for n, tr in plan.traces.items() if tr.clock.numel_out(0)])
+        clock = column(
+            [self.call(n, tr.clock, self.inputs[n]) for n, tr in plan.traces.items() if tr.clock.numel_out(0)]
+        )
         relations, scales = self.relations()
         events, conditions, periods = self.events()
         if plan.design.outputs:

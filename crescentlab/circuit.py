@@ -21,7 +21,8 @@ from crescentlab.errors import InputError, SimulationError, UnitError, nearest
 from crescentlab.fluid import Fluid
 from crescentlab.graph import build
 from crescentlab.library import Library, installed
-from crescentlab.netlist import Netlist, SimulationSection
+from crescentlab.netlist import SMALLEST_RTOL, Netlist, SimulationSection
+from crescentlab.plotting import check_plots
 from crescentlab.result import Result
 from crescentlab.solvers.loop import Options, integrate
 from crescentlab.system import System
@@ -87,8 +88,11 @@ class Circuit:
         return plan(build(design), self.library, allow_open=allow_open)
 
     def system(self, parameters: Mapping[str, str] | None = None) -> System:
-        """The assembled ODE."""
-        return self._assembled(self.design(parameters))
+        """The assembled ODE, its start values tried."""
+        design = self.design(parameters)
+        system = self._assembled(design)
+        system.values(design)
+        return system
 
     def _assembled(self, design: Design) -> System:
         key = tuple((n, structure_of(i.component)) for n, i in design.instances.items())
@@ -96,6 +100,7 @@ class Circuit:
         if key not in self._systems:
             begun = time.perf_counter()
             self._systems[key] = assemble(plan(build(design), self.library))
+            check_plots(self.netlist, self._systems[key])
             self.assembly_s = time.perf_counter() - begun
         return self._systems[key]
 
@@ -148,14 +153,14 @@ def stand_in_fluids(design: Design, library: Library) -> dict[str, Fluid]:
 
 def _check(options: Options) -> None:
     """Refuse what argparse or a caller cannot know to be wrong."""
-    if not 0 < options.rtol < 1:
-        raise InputError(f"rtol {options.rtol:g}: the relative tolerance lies between 0 and 1; write for example 1e-6")
+    if not SMALLEST_RTOL <= options.rtol < 1:
+        raise InputError(
+            f"rtol {options.rtol:g}: the relative tolerance lies between 0 and 1, from 1e-13 on; write for example 1e-6"
+        )
     if options.solver not in SOLVERS:
         raise InputError(f"solver {options.solver!r}: {nearest(options.solver, SOLVERS)}")
     if options.output_step is not None and options.stop / options.output_step > MAX_ROWS:
-        raise InputError(
-            f"output_step {options.output_step:g} s makes more than {MAX_ROWS} rows; write a longer one"
-        )
+        raise InputError(f"output_step {options.output_step:g} s makes more than {MAX_ROWS} rows; write a longer one")
 
 
 def _text(value: str | float) -> str:

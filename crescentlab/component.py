@@ -105,7 +105,10 @@ class Component(BaseModel):
         """Number of elements that ``size`` stands for, None for a scalar."""
         if size is None:
             return None
-        value = getattr(self, size) if isinstance(size, str) else size(self) if callable(size) else size
+        try:
+            value = getattr(self, size) if isinstance(size, str) else size(self) if callable(size) else size
+        except Exception as error:  # the author's slip
+            raise ComponentError(f"{type(self).__name__}: no size: {type(error).__name__}: {error}") from error
         if value is None:
             return None
         if int(value) != value or value < 0:

@@ -15,8 +15,8 @@ from typing import Any
 import numpy as np
 
 from crescentlab.component import Component, field_quantity, is_structural
-from crescentlab.domain import Held, Port, State
-from crescentlab.errors import ExpressionError, InputError, Place, UnitError, nearest
+from crescentlab.domain import Held, Observable, Port, State
+from crescentlab.errors import ComponentError, ExpressionError, InputError, Place, UnitError, nearest
 from crescentlab.expressions import Value, evaluate, is_expression, number_of
 from crescentlab.fluid import Fluid
 from crescentlab.library import Library
@@ -210,6 +210,11 @@ class _Elaboration:
     ) -> None:
         lookup = _scope_lookup(values, netlist)
         instance = _instance(cls, node, lookup, overrides, full, netlist.folder, {"type", "start"}, full)
+        try:
+            for declared in [*cls.ports(), *cls.declared(State), *cls.declared(Held), *cls.declared(Observable)]:
+                instance.size_of(declared.size)
+        except ComponentError as error:
+            raise InputError(f"{full}: {error}", node.place) from None
         stateful = {s.name: s for form in cls.forms() for s in form.declared(State) + form.declared(Held)}
         start: dict[str, np.ndarray] = {}
         given = node.value["start"].value if isinstance(node.value, dict) and "start" in node.value else {}
@@ -226,10 +231,6 @@ class _Elaboration:
                 quantity = instance.quantity(declared.quantity)
                 items = source.value if isinstance(source.value, list) else [source]
                 subject = f"{'--set ' if text is not None else ''}{full}.start.{name}"
-                size = instance.size_of(declared.size)
-                if len(items) not in (1, size):
-                    said = f"{len(items)} values for {'a single one' if size is None else f'{size} elements'}"
-                    raise InputError(f"{subject}: {said}; write one value for all, or one for each", source.place)
                 start[name] = np.array([_number(str(i.value), quantity, lookup, subject, i.place) for i in items])
         self.instances[full] = Instance(full, instance, node.place, start)
 
@@ -247,7 +248,9 @@ class _Elaboration:
         if len(chain) > MAX_SUBCIRCUIT_DEPTH:
             raise InputError(f"subcircuits nested deeper than {MAX_SUBCIRCUIT_DEPTH}", place)
         if not path.is_file():
-            raise InputError(f"the subcircuit {file} does not exist; it is looked for beside the file that names it", place)
+            raise InputError(
+                f"the subcircuit {file} does not exist; it is looked for beside the file that names it", place
+            )
         if str(key) not in self.parts:
             self.parts[str(key)] = Netlist.read(path)
         part = self.parts[str(key)]

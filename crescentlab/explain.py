@@ -44,7 +44,7 @@ def explained(model: type[BaseModel], error: ValidationError, node: Node, subjec
     details = _first(error, node)
     path = _path(details["loc"], node)
     key = str(path[-1]) if path else ""
-    name = ".".join([subject] * bool(subject) + [str(p + 1) if isinstance(p, int) else p for p in path])
+    name = "".join(f"[{step + 1}]" if isinstance(step, int) else f".{step}" for step in [subject, *path]).lstrip(".")
     place = (node.place_of(*path) if path else None) or node.place
     parent = (node.place_of(*path[:-1]) if path[:-1] else None) or node.place
     kind, said, limits = details["type"], details["msg"], details.get("ctx", {})
@@ -108,7 +108,7 @@ def _model_in(annotation: Any) -> type[BaseModel] | None:
 def _shown(value: Any, quantity: Quantity | None) -> str:
     """A number in the first unit of its quantity."""
     if quantity is None or not isinstance(value, (int, float)):
-        return str(value)
+        return f"{value:g}" if isinstance(value, float) else str(value)
     return quantity.show(value, next(iter(quantity.units))) if value else "0"
 
 

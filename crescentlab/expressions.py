@@ -172,7 +172,10 @@ _PLAIN = {"sin": maths.sin, "cos": maths.cos, "tan": maths.tan, "asin": maths.as
           "exp": maths.exp, "log": maths.log, "tanh": maths.tanh, "sinh": maths.sinh, "cosh": maths.cosh}  # fmt: skip
 _WHOLE: dict[str, Callable[[float], float]] = {"floor": math.floor, "ceil": math.ceil, "round": lambda x: round(x)}
 _SAME = {"min": maths.minimum, "max": maths.maximum}
-_REDUCE: dict[str, Callable[[Any], Any]] = {"sum": maths.total, "mean": lambda v: maths.total(v) / len(v) if getattr(v, "shape", ()) else v}
+_REDUCE: dict[str, Callable[[Any], Any]] = {
+    "sum": maths.total,
+    "mean": lambda v: maths.total(v) / len(v) if getattr(v, "shape", ()) else v,
+}
 FUNCTIONS = sorted([*_PLAIN, *_WHOLE, *_SAME, *_REDUCE, "abs", "sqrt", "where", "involute", "atan2"])
 _COMPARE: dict[type[ast.cmpop], Callable[[Any, Any], Any]] = {
     ast.Lt: operator.lt,
@@ -349,7 +352,11 @@ def _title(value: Value) -> str:
         return "a condition"
     if value.quantity is ratio:
         return "a pure number"
-    return f"{value.quantity.titled} [{value.quantity.si}]" if value.quantity.name in QUANTITIES else f"a value in {value.quantity.si}"
+    return (
+        f"{value.quantity.titled} [{value.quantity.si}]"
+        if value.quantity.name in QUANTITIES
+        else f"a value in {value.quantity.si}"
+    )
 
 
 def _combine(a: Dims, b: Dims, sign: int) -> Quantity:

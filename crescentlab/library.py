@@ -101,29 +101,37 @@ def _classes(module: ModuleType) -> Iterator[tuple[str, type]]:
             yield snake_case(name), found
 
 
-@cache
 def _load_file(path: Path, place: Place | None) -> ModuleType:
     if not path.is_file():
         raise InputError(
             f"the library file {path.name} does not exist; it is looked for beside the circuit file", place
         )
-    name = f"crescentlab_user_{path.stem}_{abs(hash(str(path.resolve()))):x}"
-    spec = importlib.util.spec_from_file_location(name, path)
-    if spec is None or spec.loader is None:
+    if path.suffix != ".py":
         raise InputError(f"the library file {path.name} is not a Python file; its name must end in .py", place)
+    try:
+        return _imported(path.resolve(), path.stat().st_mtime_ns)
+    except ComponentError as error:
+        raise InputError(f"{path.name}: {error}", place) from None
+    except (Exception, SystemExit) as error:  # whatever a user's file raises is the user's to mend
+        frames = [f for f in traceback.extract_tb(error.__traceback__) if f.filename == str(path.resolve())]
+        line = frames[-1].lineno if frames else getattr(error, "lineno", None)
+        where = f" (line {line})" if line else ""
+        said = f"{type(error).__name__}: {error}".splitlines()[0].removesuffix(": ")
+        raise InputError(f"the library file {path.name} does not import: {said}{where}; mend it", place) from None
+
+
+@cache
+def _imported(path: Path, changed: int) -> ModuleType:
+    """The module of a file, imported again once the file has changed."""
+    name = f"crescentlab_user_{path.stem}_{abs(hash(path)):x}"
+    spec = importlib.util.spec_from_file_location(name, path)
+    assert spec is not None
+    assert spec.loader is not None
     module = importlib.util.module_from_spec(spec)
     sys.modules[name] = module
     try:
         spec.loader.exec_module(module)
-    except ComponentError as error:
+    except BaseException:
         del sys.modules[name]
-        raise InputError(f"{path.name}: {error}", place) from None
-    except Exception as error:  # whatever a user's file raises is the user's to mend
-        del sys.modules[name]
-        frames = [f for f in traceback.extract_tb(error.__traceback__) if f.filename == str(path)]
-        line = frames[-1].lineno if frames else getattr(error, "lineno", None)
-        where = f" (line {line})" if line else ""
-        raise InputError(
-            f"the library file {path.name} does not import: {type(error).__name__}: {error}{where}", place
-        ) from None
+        raise
     return module

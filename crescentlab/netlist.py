@@ -146,7 +146,10 @@ class Netlist:
         _collections(node)
         sections = validated(CircuitFile, node)
         if not sections.components:
-            raise InputError("there are no components; list them, for example components: {tank: {type: tank}}", node.place_of("components"))
+            raise InputError(
+                "there are no components; list them, for example components: {tank: {type: tank}}",
+                node.place_of("components"),
+            )
         if sections.fluid is not None and sections.fluids:
             raise InputError("write either fluid: or fluids:, not both", node.place_of("fluids"))
         if sections.ports and sections.simulation.stop_when:

@@ -55,12 +55,25 @@ def check_plots(netlist: Netlist, system: System) -> None:
         wanted = [(name, ("y", j)) for j, name in enumerate(plot.y)] + ([(plot.x, ("x",))] if plot.x else [])
         for name, where in wanted:
             try:
-                system.find(name.partition("[")[0])
+                _refuse(system, name, where == ("x",))
             except InputError as error:
                 place = (
                     netlist.place("plots", k, *where) or netlist.place("plots", k, where[0]) or netlist.place("plots")
                 )
                 raise InputError(f"plots: {error.message}", place) from None
+
+
+def _refuse(system: System, name: str, horizontal: bool) -> None:
+    """Raise unless the system has the variable, or the element of it, that a plot names."""
+    base, bracket, index = name.partition("[")
+    variable = system.find(base)
+    n = len(variable.expression()) if variable.vector else None
+    if bracket and n is None:
+        raise InputError(f"{name}: {base} is a single value; write {base}")
+    if bracket and index not in [f"{k + 1}]" for k in range(n or 0)]:
+        raise InputError(f"{name}: {base} has {n} elements, counted from 1; write for example {base}[1]")
+    if horizontal and n is not None and not bracket:
+        raise InputError(f"x: {name} is a vector; write one element, for example {name}[1]")
 
 
 def _sections(result: Result) -> Iterable[PlotSection]:

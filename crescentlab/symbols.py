@@ -12,6 +12,7 @@ that ``event_where`` and ``when`` turn into relations with events of their own.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
+from contextvars import ContextVar
 from dataclasses import dataclass
 from typing import Any
 
@@ -225,11 +226,18 @@ class Relation(Condition):
         return compare(self.lhs.sx, self.rhs.sx)
 
 
+EQUALITIES: ContextVar[list[Equality] | None] = ContextVar("crescentlab_equalities", default=None)
+"""Every ``==`` met while a component is traced; the tracer refuses those between continuous values."""
+
+
 class Equality(Condition):
     """``lhs == rhs`` between held values, which change only at events."""
 
     def __init__(self, lhs: Sym, rhs: Sym) -> None:
         self.lhs, self.rhs = lhs, rhs
+        met = EQUALITIES.get()
+        if met is not None:
+            met.append(self)
         self.shape = broadcast(lhs.shape, rhs.shape)
 
     def lower(self, bit: Callable[[Relation], ca.SX] | None = None) -> ca.SX:
@@ -296,13 +304,3 @@ def as_condition(value: Any) -> Condition:
     if isinstance(value, (bool, np.bool_)):
         return Constant(bool(value))
     raise TypeError(f"{value!r} is not a condition; compare something, for example x > 0")
-
-
-def parts(condition: Condition) -> Iterator[Condition]:
-    """Every node of a condition, itself included."""
-    yield condition
-    if isinstance(condition, Both):
-        yield from parts(condition.left)
-        yield from parts(condition.right)
-    elif isinstance(condition, Not):
-        yield from parts(condition.inner)

@@ -133,9 +133,17 @@ class System:
     @functools.cached_property
     def relation(self) -> Prepared:
         """(t, x, h, b, dx/dt) -> relations g, their time derivatives, and the magnitude of their sides."""
-        g, rate_x = self.relations, ca.SX.sym("v", self.x.numel())
-        rate = ca.jtimes(g, self.x, rate_x) + ca.jacobian(g, self.t) if g.numel() else ca.SX(0, 1)
-        return prepare("g", [*self.arguments[:-1], rate_x], self.p, [g, rate, self.scales])
+        return self._relations(list(range(self.relations.numel())))
+
+    @functools.cached_property
+    def relation_on_state(self) -> Prepared:
+        """As :attr:`relation`, only those that depend on states: the ones to be watched at every step."""
+        return self._relations(np.flatnonzero(self.bits.on_state).tolist())
+
+    def _relations(self, rows: list[int]) -> Prepared:
+        g, scales, rate_x = self.relations[rows], self.scales[rows], ca.SX.sym("v", self.x.numel())
+        rate = ca.jtimes(g, self.x, rate_x) + ca.jacobian(g, self.t) if rows else ca.SX(0, 1)
+        return prepare("g", [*self.arguments[:-1], rate_x], self.p, [g, rate, scales])
 
     @functools.cached_property
     def condition(self) -> Prepared:
@@ -206,12 +214,17 @@ class System:
 def _start(
     given: dict[str, Array], declared: State | Held, component: Component, fluids: list[Any], name: str, place: Any
 ) -> Array:
-    default = component.start_of(declared, fluids[0] if fluids else None)
+    try:
+        default = component.start_of(declared, fluids[0] if fluids else None)
+    except Exception as error:  # the author's slip
+        said = f"{name}: no start value for {declared.name} ({type(error).__name__}: {error})"
+        raise InputError(f"{said}; write one, for example start: {{{declared.name}: ...}}", place) from error
     if declared.name not in given:
         return default
     value = given[declared.name]
     if value.size not in (1, default.size):
-        raise InputError(f"{name}: start of {declared.name} has {value.size} values for {default.size} elements", place)
+        said = f"{name}: start of {declared.name} has {value.size} values for {default.size}"
+        raise InputError(f"{said}; write one for all, or one for each", place)
     return np.broadcast_to(value, default.shape)
 
 

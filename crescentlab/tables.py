@@ -68,7 +68,7 @@ class CurveOf:
 
     def _read(self, value: Any, info: ValidationInfo) -> Any:
         try:
-            if isinstance(value, str):
+            if isinstance(value, str) and value:
                 folder = Path((info.context or {}).get("folder", "."))
                 return read_csv(folder / value, self.x, self.y)
             if isinstance(value, dict) and {"x", "y"} <= set(value) <= set(Curve.model_fields):
@@ -99,53 +99,52 @@ def _column(items: Any, quantity: Quantity | None, name: str) -> tuple[list[floa
     return values, quantity or QUANTITIES["ratio"]
 
 
-def _curve(xs: list[float], ys: list[float], x: Quantity, y: Quantity) -> Curve:
+def _curve(xs: list[float], ys: list[float], x: Quantity, y: Quantity, places: list[Place] | None = None) -> Curve:
+    """The checked curve; ``places`` are the lines of its points."""
     if len(xs) != len(ys):
         raise InputError(f"{len(xs)} values of x and {len(ys)} of y; write as many of each")
     if len(xs) < 2:
         raise InputError("a curve needs at least two points")
     if len(xs) > MAX_POINTS:
         raise InputError(f"{len(xs)} points; a curve may have {MAX_POINTS}, so thin it out")
+    unit = next(iter(x.units))
     for k, (first, second) in enumerate(zip(xs[:-1], xs[1:], strict=True)):
         if not second > first:
-            raise InputError(
-                f"x must rise from point to point, but point {k + 2} is {second:g} after {first:g} (SI); sort the rows"
-            )
+            said = f"x must rise from point to point, but {x.show(second, unit)} follows {x.show(first, unit)}"
+            raise InputError(f"{said}; sort the points", places[k + 1] if places else None)
     return Curve(x=tuple(xs), y=tuple(ys), x_quantity=x.name, y_quantity=y.name)
 
 
 def read_csv(path: Path, x: Quantity | None = None, y: Quantity | None = None) -> Curve:
     """Read a two-column CSV file with units in its header; raises :class:`InputError` with the line."""
     try:
-        rows = list(csv.reader(path.read_text(encoding="utf-8-sig").splitlines()))
+        reader = csv.reader(path.read_text(encoding="utf-8-sig").splitlines())
+        rows = [(Place(str(path), reader.line_num), row) for row in reader if any(cell.strip() for cell in row)]
     except OSError as error:
         raise InputError(
             f"cannot read the table {path.name}: {error.strerror}; it is looked for beside the circuit file"
         ) from None
-    except UnicodeDecodeError:
-        raise InputError(f"the table {path.name} is not text in UTF-8") from None
-    if not rows or len(rows[0]) != 2:
-        raise InputError(
-            "the first line must name two columns with units, for example: pressure [bar], deflection [mm]",
-            Place(str(path), 1),
-        )
-    columns = [_header(title, quantity, path) for title, quantity in zip(rows[0], (x, y), strict=True)]
+    except (UnicodeDecodeError, csv.Error) as error:
+        raise InputError(f"the table {path.name} is not text in UTF-8 ({error})") from None
+    top = Place(str(path), 1)
+    if not rows or len(rows[0][1]) != 2:
+        said = "the first line must name two columns with units, separated by a comma"
+        raise InputError(f"{said}, for example: pressure [bar], deflection [mm]", top)
+    columns = [_header(title, quantity, path) for title, quantity in zip(rows[0][1], (x, y), strict=True)]
     values: tuple[list[float], list[float]] = ([], [])
-    for number, row in enumerate(rows[1:], start=2):
-        place = Place(str(path), number)
-        if not [cell for cell in row if cell.strip()]:
-            continue
+    for place, row in rows[1:]:
         if len(row) != 2 or not row[0].strip() or not row[1].strip():
-            raise InputError(f"a value is missing; write two numbers, not {','.join(row)!r}", place)
+            said = "write two numbers separated by a comma, their decimals after a point"
+            raise InputError(f"{said}, not {','.join(row)!r}", place)
         for cell, (quantity, unit), column in zip(row, columns, values, strict=True):
             try:
                 column.append(quantity.parse(f"{float(cell)!r} {unit}"))
             except (ValueError, UnitError):
                 raise InputError(f"{cell.strip()!r} is not a finite number", place) from None
     try:
-        return _curve(*values, columns[0][0], columns[1][0])
+        return _curve(*values, columns[0][0], columns[1][0], [place for place, _ in rows[1:]])
     except InputError as error:
-        raise error.at(Place(str(path), 1)) from None
+        raise error.at(top) from None
 
 
 def _header(title: str, quantity: Quantity | None, path: Path) -> tuple[Quantity, str]:

@@ -8,6 +8,7 @@ algebraic loop arises.
 from __future__ import annotations
 
 import functools
+import string
 from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Any
@@ -21,7 +22,7 @@ from crescentlab.domain import HYDRAULIC, Held, Observable, State
 from crescentlab.errors import ComponentError
 from crescentlab.fluid import Fluid
 from crescentlab.maths import TRACER, Event, Failure, Tick
-from crescentlab.symbols import Condition, Equality, Relation, Sym, as_condition, column, parts
+from crescentlab.symbols import EQUALITIES, Condition, Equality, Relation, Sym, as_condition, column
 from crescentlab.units import Quantity
 
 Slot = tuple[str, int | None]
@@ -206,12 +207,12 @@ class _Tracing:
         self.parameters = numeric_fields(cls, component)
         self.fluid_names = fluids_asked(cls)
         self.t = ca.SX.sym("t")
-        self.x, self.h, self.u = (
-            ca.SX.sym(n, lay.size) for n, lay in (("x", self.states), ("h", self.held), ("u", self.inputs))
-        )
-        self.p = ca.SX.sym("p", len(self.parameters))
+        self.x, self.h, self.u = (_symbols(lay.slots) for lay in (self.states, self.held, self.inputs))
+        self.p = _symbols([(n, None) for n in self.parameters])
         fluid_fields = [numeric_fields(type(fluids[n]), fluids[n]) for n in self.fluid_names]
-        self.pf = ca.SX.sym("pf", sum(len(f) for f in fluid_fields))
+        self.pf = _symbols(
+            [(f"{n}.{f}", None) for n, fs in zip(self.fluid_names, fluid_fields, strict=True) for f in fs]
+        )
         self.known: dict[str, Any] = {
             **self.states.cut(self.x),
             **self.held.cut(self.h),
@@ -232,6 +233,8 @@ class _Tracing:
     def run(self) -> tuple[dict[str, Any], _Bits]:
         bits = _Bits()
         token = TRACER.set(bits)
+        met: list[Equality] = []
+        equalities = EQUALITIES.set(met)
         try:
             returned = self.symbolic.equations(**{n: self.known[n] for n in self.cls.asks_for()})
             check_returned(self.cls, returned)
@@ -245,17 +248,16 @@ class _Tracing:
             raise self.fail(f"its equations do not work on symbols: {type(error).__name__}: {error}") from error
         finally:
             TRACER.reset(token)
+            EQUALITIES.reset(equalities)
+        for equality in met:
+            if any(ca.which_depends(equality.lhs.sx - equality.rhs.sx, ca.vertcat(self.x, self.t), 1, True)):
+                raise self.fail("== compares a continuous value, which never meets exactly; use <, <=, > or >=")
         return returned, bits
 
     def lowered(self, condition: Any, bits: _Bits) -> ca.SX:
         made = as_condition(condition)
         if made.shape != ():
             raise self.fail("an event's condition must be a scalar; combine a vector's elements first")
-        for part in parts(made):
-            if isinstance(part, Equality) and any(
-                ca.which_depends(part.lhs.sx - part.rhs.sx, ca.vertcat(self.x, self.t), 1, True)
-            ):
-                raise self.fail("== compares a continuous value, which never meets exactly; use <, <=, > or >=")
         return made.lower(bits.bit)
 
     def done(self) -> Trace:
@@ -325,7 +327,10 @@ class _Tracing:
         periods: list[ca.SX] = []
         for (name, value), condition in zip(returned.items(), self.conditions, strict=True):
             if isinstance(value, Failure):
-                names = tuple(n for n in self.observables.offsets if f"{{{n}}}" in value.message)
+                names = tuple(n for _, n, _, _ in string.Formatter().parse(value.message) if n is not None)
+                unknown = [n for n in names if n not in self.observables.offsets]
+                if unknown:
+                    raise self.fail(f"the message of {name} shows {{{unknown[0]}}}, which is no observable")
                 infos.append(
                     EventInfo(name, "fail", condition=len(conditions), message=value.message, message_names=names)
                 )
@@ -352,6 +357,12 @@ class _Tracing:
             if isinstance(value, Condition):
                 values[name] = Sym(value.lower(), value.shape)
         return ca.vertcat(self.column(values, self.states), self.column(values, self.held))
+
+
+def _symbols(slots: Iterable[Slot]) -> ca.SX:
+    """One symbol per element, called as in the component's text so that messages can quote relations."""
+    names = [[name] if size is None else [f"{name}[{k + 1}]" for k in range(size)] for name, size in slots]
+    return column([ca.SX.sym(n) for each in names for n in each])
 
 
 def _text(relation: Relation) -> str:

@@ -108,7 +108,9 @@ def _split(text: str, advice: str = "") -> tuple[float, str]:
     """The number and the unit of a text; raise :class:`UnitError` if it does not begin with a number."""
     match = _NUMBER.match(text)
     if not match:
-        raise UnitError(f"{repr(text) + ' is not a number with a unit' if text.strip() else 'the value is missing'}{advice}")
+        raise UnitError(
+            f"{repr(text) + ' is not a number with a unit' if text.strip() else 'the value is missing'}{advice}"
+        )
     if re.match(r",\d", match[2]):
         raise UnitError(f"{text!r}: decimals follow a point; write {text.replace(',', '.', 1)}")
     return float(match[1]), match[2]
@@ -310,7 +312,9 @@ def parse_any(text: str) -> tuple[float, Quantity]:
     owners = [q for q in QUANTITIES.values() if key in q.units]
     if not owners:
         known = [u for q in QUANTITIES.values() for u in q.units if u]
-        raise UnitError(f"{text!r}: unknown unit {unit!r}: {nearest(key, known, otherwise=f'units are {COMMON} and the like')}")
+        raise UnitError(
+            f"{text!r}: unknown unit {unit!r}: {nearest(key, known, otherwise=f'units are {COMMON} and the like')}"
+        )
     owner = speed if speed in owners else owners[0]  # 1/min is a speed, not a frequency
     return owner.parse(text), owner
 

@@ -78,7 +78,8 @@ def read(path: Path, shown: str | None = None) -> Node:
         size = path.stat().st_size
         if size > MAX_BYTES:
             raise InputError(
-                f"the file has {size} bytes; a circuit file may have {MAX_BYTES}, so split it into subcircuits", Place(name, 1)
+                f"the file has {size} bytes; a circuit file may have {MAX_BYTES}, so split it into subcircuits",
+                Place(name, 1),
             )
         data = path.read_bytes()
         text = data.decode("utf-8-sig")
@@ -88,7 +89,9 @@ def read(path: Path, shown: str | None = None) -> Node:
         raise InputError(f"cannot read the file: {error.strerror}", Place(name, 1)) from None
     except UnicodeDecodeError as error:
         place = Place(name, 1 + data.count(b"\n", 0, error.start))
-        raise InputError(f"byte 0x{data[error.start]:02x} is not text in UTF-8; save the file as UTF-8", place) from None
+        raise InputError(
+            f"byte 0x{data[error.start]:02x} is not text in UTF-8; save the file as UTF-8", place
+        ) from None
     return parse(text, name)
 
 
@@ -123,7 +126,10 @@ def _explained(error: yaml.MarkedYAMLError, lines: list[str]) -> tuple[str, int]
     if flow and (line > len(lines) or (line > begun and _indent(shown) <= _indent(first))):
         return f"a bracket opened here is never closed; look at: {first.strip()}", begun
     if flow and ("' or '" in problem or "mapping values" in problem):
-        return f"brackets do not match, a comma is missing, or text with a colon needs quotes; look at: {shown.strip()}", line
+        return (
+            f"brackets do not match, a comma is missing, or text with a colon needs quotes; look at: {shown.strip()}",
+            line,
+        )
     if "end of stream" in problem:
         return f"a quote opened here is never closed; look at: {first.strip()}", begun
     if "expected ':'" in problem:
@@ -131,11 +137,17 @@ def _explained(error: yaml.MarkedYAMLError, lines: list[str]) -> tuple[str, int]
             return f"a blank is missing after the colon; write: {glued[1]}: {glued[2]}", begun
         return f"a colon is missing; write: {first.strip()}:", begun
     if "mapping values" in problem:
-        return f"a colon where none can stand; quote text that holds one, and look at the indentation of: {shown.strip()}", line
+        return (
+            f"a colon where none can stand; quote text that holds one, and look at the indentation of: {shown.strip()}",
+            line,
+        )
     if "start any token" in problem and mark and mark.column < len(shown):
         return f"text that begins with {shown[mark.column]} must be quoted; look at: {shown.strip()}", line
     if "expected" in problem and not flow:
-        return f"this does not continue what stands above it; look at indentation and brackets of: {shown.strip()}", line
+        return (
+            f"this does not continue what stands above it; look at indentation and brackets of: {shown.strip()}",
+            line,
+        )
     return f"not YAML: {problem or 'it cannot be read'}; look at: {shown.strip()}", line
 
 
@@ -243,7 +255,9 @@ class _Builder:
         if isinstance(event, yaml.AliasEvent):
             self.aliased += node.size
         if self.aliased > MAX_ALIASED:
-            raise InputError(f"aliases (*name) expand to more than {MAX_ALIASED} values; write them out", self.place(event))
+            raise InputError(
+                f"aliases (*name) expand to more than {MAX_ALIASED} values; write them out", self.place(event)
+            )
         if anchor:
             self.anchors[anchor] = node
         if not self.stack:
@@ -267,14 +281,25 @@ class _Builder:
         line = _line(self.lines, self.place(event).line)
         if not isinstance(node.value, str):
             better = quoted(line, self.continued(event))
-            raise InputError(f"{MUST_QUOTE}: {better.strip()}" if better != line else f"a key must be a word; look at: {line.strip()}", self.place(event))
+            raise InputError(
+                f"{MUST_QUOTE}: {better.strip()}"
+                if better != line
+                else f"a key must be a word; look at: {line.strip()}",
+                self.place(event),
+            )
         if not event.style and (bracket := re.match(r"([\w.]+)\s+([\[{].*)", node.value)):
-            raise InputError(f"a colon is missing before the bracket; write: {bracket[1]}: {line.strip().removeprefix(bracket[1]).strip()}", node.place)
+            raise InputError(
+                f"a colon is missing before the bracket; write: {bracket[1]}: {line.strip().removeprefix(bracket[1]).strip()}",
+                node.place,
+            )
         if not event.style and (glued := re.match(r"([A-Za-z_][\w.]*):(\S.*)", node.value)):
             raise InputError(f"a blank is missing after the colon; write: {glued[1]}: {glued[2]}", node.place)
         if node.value in parent.keys:
             first = parent.keys[node.value]
-            raise InputError(f"the key {node.value!r} stands twice (first in line {first.line if first else '?'}); remove one", node.place)
+            raise InputError(
+                f"the key {node.value!r} stands twice (first in line {first.line if first else '?'}); remove one",
+                node.place,
+            )
         parent.keys[node.value] = node.place
         return node.value
 

@@ -12,6 +12,8 @@ from crescentlab.library import Library, installed
 from crescentlab.netlist import Netlist
 from crescentlab.result import Result
 
+OIL = {"type": "simple_oil", "density": "860 kg/m^3", "kinematic_viscosity": "35 cSt", "bulk_modulus": "14000 bar"}
+
 
 def library(*classes: type[Component]) -> Library:
     """The installed library and these classes under their type names."""

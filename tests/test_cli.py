@@ -385,9 +385,9 @@ def test_input_errors_name_file_and_line(
         (["-o", "missing/r.nc"], "the folder missing does not exist"),
         (["--set", "supply"], "NAME=VALUE"),
         (["--set", "suply=1 L/min"], "did you mean supply"),
-        (["--set", "supply=1 bar"], "--set supply: this must be a flow"),
+        (["--set", "supply=1 bar"], "--set supply: '1 bar': 'bar' is a unit of pressure"),
         (["--set", "supply=1 L/min", "--set", "supply=2 L/min"], "--set supply is given twice"),
-        (["--set", "line.volume=-1 cm^3"], "--set line.volume: "),
+        (["--set", "line.volume=-1 cm^3"], "--set line.volume must be above 0, not -1 cm3"),
         (["--set", "fluid.densty=1 kg/m^3"], "did you mean fluid.density"),
     ],
 )

@@ -6,9 +6,10 @@ import math
 
 import numpy as np
 import pytest
-from building import alone, circuit, fired
+from building import OIL, alone, circuit, fired
 from pydantic import Field
 
+from crescentlab.circuit import find
 from crescentlab.component import Component
 from crescentlab.domain import gives_signal, held, observable, state, takes_signal
 from crescentlab.errors import InputError, SimulationError
@@ -89,16 +90,15 @@ class EveryKind(Clockwork):
 
     def equations(self, t, x, v, n):
         return {
-            "der_x": v, "der_v": 0.0, "on_state": when(x > 2), "linear": when(2 * t - n > 4), "curved": when(sin(t) > 2),
-            "on_held": when(n >= 3), "mixed": when(x + t > 9), "bent": when(t * n > 4),
+            "der_x": v, "der_v": 0.0, "on_state": when(x > 2), "linear": when(2 * t - n > 4),
+            "curved": when(sin(t) > 2), "on_held": when(n >= 3), "mixed": when(x + t > 9), "slanted": when(t * n > 4),
         }  # fmt: skip
 
 
 def test_kinds_are_read_from_the_graph():
-    """State (also with time): root-found; time alone: exact stop if linear, else scanned; held only: none of these."""
+    """States (also with time): root-found; time alone: exact stop if linear, else scanned; held only: none of these."""
     bits = alone(EveryKind).system().bits
-    found = dict(zip([n.split(": ")[1] for n in bits.names], zip(bits.on_state, bits.on_time, bits.linear, strict=True), strict=True))
-    kinds = list(found.values())
+    kinds = list(zip(bits.on_state, bits.on_time, bits.linear, strict=True))
     assert kinds == [(1, 0, 0), (0, 1, 1), (0, 1, 0), (0, 0, 0), (1, 0, 0), (0, 1, 1)]
 
 
@@ -132,7 +132,7 @@ class Schedule(Clockwork):
 @pytest.mark.parametrize("at", [0.1, 0.3, 1 / 3, 0.7, math.pi / 4, 1e-9, 1.0])
 @pytest.mark.parametrize("solver", ["lsoda", "rk45"])
 def test_a_time_step_is_hit_exactly(at, solver):
-    """A relation linear in t is an exact stop, to the last bit of t; so x' and v' are exact within the tolerance 1e-6."""
+    """A relation linear in t is an exact stop, to the last bit of t; v is then right within the tolerance of 1e-6."""
     result = alone(Schedule, at=f"{at!r} s").simulate(1.0, solver=solver)
     (time,) = fired(result, "part.step")
     assert abs(time - at) <= np.spacing(at)
@@ -195,7 +195,8 @@ class BothSides(Component):
 
 def test_a_cycle_is_an_error_that_names_the_relation():
     """Sliding on a boundary needs a mode; the message says which relation, and what is missing."""
-    with pytest.raises(SimulationError, match=r"at 1 s of 2 s: both sides push towards the boundary of part: level > 0") as caught:
+    message = "at 1 s of 2 s: both sides push towards the boundary of part: level > 0"
+    with pytest.raises(SimulationError, match=message) as caught:
         alone(BothSides).simulate(2.0)
     assert caught.value.result.time[-1] == pytest.approx(1.0, abs=1e-9)
 
@@ -280,7 +281,8 @@ class Dominoes(Component):
 
     def equations(self, t, first, second):
         return {
-            "three": when(second > 0.5, third=10 * second + first), "two": when(first > 0.5, second=first + 1, first=5.0),
+            "three": when(second > 0.5, third=10 * second + first),
+            "two": when(first > 0.5, second=first + 1, first=5.0),
             "one": when(t >= 0.5, first=1.0),
         }  # fmt: skip
 
@@ -303,7 +305,9 @@ class PingPong(Component):
 
 def test_endless_rounds_are_an_error_with_names():
     """After 40 rounds the run fails, says at which time, and names the events."""
-    with pytest.raises(SimulationError, match=r"at 0\.5 s of 1 s: events keep causing each other .*part\.ping.*part\.pong|part\.pong.*part\.ping"):
+    with pytest.raises(
+        SimulationError, match=r"at 0\.5 s of 1 s: events keep causing each other .*: part\.p[io]ng, part\.p[io]ng$"
+    ):
         alone(PingPong).simulate(1.0)
 
 
@@ -404,7 +408,8 @@ class TimedByHeld(Component):
 @pytest.mark.parametrize("cls", [TimedByTime, TimedByHeld])
 def test_a_period_depends_on_parameters_only(cls):
     """Anything else is the author's mistake, named with the event."""
-    with pytest.raises(InputError, match=f"component {cls.__name__}: the period of tick must depend on parameters only"):
+    message = f"component {cls.__name__}: the period of tick must depend on parameters only"
+    with pytest.raises(InputError, match=message):
         alone(cls).simulate(1.0)
 
 
@@ -550,7 +555,8 @@ class Limited(Clockwork):
     shown = observable(Ratio, "x")
 
     def equations(self, x, v):
-        return {"der_x": v, "der_v": 0.0, "shown": x, "too_far": fail_when(x > 0.5, "x reached {shown}; write a smaller v")}
+        message = "x reached {shown}; write a smaller v"
+        return {"der_x": v, "der_v": 0.0, "shown": x, "too_far": fail_when(x > 0.5, message)}
 
 
 def test_fail_when_ends_the_run_with_its_message():
@@ -563,7 +569,9 @@ def test_fail_when_ends_the_run_with_its_message():
     np.testing.assert_allclose(result["part.x"], result.time, rtol=1e-12)
 
 
-@pytest.mark.parametrize(("condition", "time"), [("part.x > 0.5", 0.5), ("part.x >= part.v / 4", 0.25), ("part.x > 7", 1.0)])
+@pytest.mark.parametrize(
+    ("condition", "time"), [("part.x > 0.5", 0.5), ("part.x >= part.v / 4", 0.25), ("part.x > 7", 1.0)]
+)
 def test_stop_when_stops_at_the_root(condition, time):
     """The last time is the root; the status says whether it was the condition that ended the run."""
     result = alone(Crossing, simulation={"stop_when": condition}).simulate(1.0)
@@ -592,7 +600,7 @@ class Ball(Component):
 @pytest.mark.parametrize("solver", ["auto", "bdf", "radau", "rk45", "dop853"])
 @pytest.mark.parametrize("e", [0.1, 0.5, 0.8])
 def test_a_zeno_sequence_fails_and_names_the_event(solver, e):
-    """Bounces pile up at t1 (1 + e)/(1 - e), t1 = sqrt(2/g); there the run fails, within a few of the solver's tolerances."""
+    """Bounces pile up at t1 (1 + e)/(1 - e), t1 = sqrt(2/g): there the run fails, at the default rtol 0.5 % off."""
     result = alone(Ball, e=e).simulate(10.0, solver=solver, check=False)
     assert result.trajectory.status == "failed"
     assert "part.bounce happens faster and faster" in result.trajectory.error
@@ -666,6 +674,25 @@ def test_a_resting_system_misses_no_excitation(cls, solver):
     np.testing.assert_allclose(times, (np.arange(PULSES) + 0.5) / PULSES, atol=0.06 / PULSES)
 
 
+class LoneBump(Component):
+    """A resting filter behind one smooth bump of a clock."""
+
+    width: Time = Field(default=1e-3, description="where the bump has fallen to 1/e")
+    x = plain("x")
+
+    def equations(self, t, x):
+        return {"der_x": (exp(-(((t - 0.4567) / self.width) ** 2)) - x) / 1e-4, "found": when(x > 0.5)}
+
+
+@pytest.mark.parametrize("width", [1e-2, 1e-3, 3e-4])
+@pytest.mark.parametrize("solver", ["auto", "bdf", "radau"])
+def test_a_lone_bump_is_not_stepped_over(width, solver):
+    """A bump as short as 0.03 % of the run wakes the filter, which rests before and after it."""
+    result = alone(LoneBump, width=f"{width} s").simulate(1.0, solver=solver)
+    assert len(fired(result, "part.found")) == 1
+    assert result.trajectory.statistics.steps < 400
+
+
 class Wheel(Component):
     """A wheel of many teeth that nothing follows: up to two teeth pass in one step of 0.3 rad, and more of x."""
 
@@ -686,7 +713,7 @@ class Wheel(Component):
 @pytest.mark.parametrize("teeth", [5, 13, 25, 40])
 @pytest.mark.parametrize("width", [0.5, 0.1, 0.01])
 def test_every_tooth_of_a_wheel_is_seen(teeth, width):
-    """An event function may swing faster than the states it depends on: three turns, three times as many events as teeth."""
+    """A relation may swing faster than the states it depends on: in three turns three events a tooth."""
     result = alone(Wheel, teeth=teeth, width=width).simulate(3.0)
     expected = (np.arange(3 * teeth) + 0.5 - width / 2) / teeth
     assert fired(result, "part.by_phi") == pytest.approx(expected, abs=1e-9)
@@ -736,7 +763,10 @@ class AtZero(Component):
     u = plain("u", 1.0)
 
     def equations(self, x, u):
-        return {"der_x": 0.0 * u, "der_u": -u, "below": when(x < 0), "above": when(x > 0), "there": when(x <= 0), "rides": when(x * u > 0)}
+        return {
+            "der_x": 0.0 * u, "der_u": -u, "below": when(x < 0), "above": when(x > 0), "there": when(x <= 0),
+            "rides": when(x * u > 0),
+        }  # fmt: skip
 
 
 @pytest.mark.parametrize("solver", ["auto", "bdf", "radau", "rk45", "dop853"])
@@ -758,7 +788,7 @@ class Flat(Component):
 
 @pytest.mark.parametrize("solver", ["rk45", "dop853", "radau"])
 def test_a_flat_root_is_found_in_time(solver):
-    """1e-15 of roundoff is (1e-5)^3, so the root is known to 1e-5; the search must not crawl there in steps of 1e-13."""
+    """1e-15 of roundoff is (1e-5)^3, so the root is known to 1e-5; the search must not crawl in steps of 1e-13."""
     result = alone(Flat).simulate(1.0, solver=solver, rtol=1e-8)
     assert fired(result, "part.below") == [pytest.approx(0.51, abs=5e-4)]
     assert result.trajectory.statistics.wall_s < 2
@@ -772,7 +802,8 @@ class CurvedTime(Component):
     def equations(self, t, n):
         return {
             "near": when((t - 0.5) ** 2 < 1e-8), "touch": when((t - 0.25) ** 2 < 0), "sine": when(sin(t) > 0.5),
-            "waves": when(sin(20 * pi * t) > 0.5, n=n + 1), "gone": when(not_(exp(t) < 2)), "always": when(exp(-t) > 0.1),
+            "waves": when(sin(20 * pi * t) > 0.5, n=n + 1), "gone": when(not_(exp(t) < 2)),
+            "always": when(exp(-t) > 0.1),
         }  # fmt: skip
 
 
@@ -804,7 +835,7 @@ class CurvedByHeld(Component):
 
 
 def test_curved_time_roots_are_not_stale():
-    """cos 5t > 0.5 at t0; its next rise at pi/3 is replaced by that of sin 3t at 13 pi/18. Held levels move roots as well."""
+    """cos 5t > 0.5 at t0; its next rise at pi/3 gives way to that of sin 3t at 13 pi/18. Held levels move roots too."""
     assert fired(alone(CurvedByBit).simulate(3.0), "part.up") == pytest.approx([0.0, 13 * math.pi / 18], abs=1e-11)
     result = alone(CurvedByHeld).simulate(0.5)
     expected = [math.log(1.001 * (1 + n / 200)) for n in range(130)]
@@ -879,9 +910,10 @@ def test_the_output_grid_shows_the_value_after_an_event():
 
 @pytest.mark.parametrize("solver", ["auto", "rk45"])
 def test_bouncing_ball(solver):
-    """Dropped from h: t_1 = sqrt(2h/g), then flights of 2 e^n v_1/g; energy falls by e^2; at rest once e^n v_1 < rest speed.
+    """Dropped from h: t_1 = sqrt(2h/g), then flights of 2 e^n v_1/g, each with e^2 of the energy, until it rests.
 
-    Closed form of the law of impact; tolerance: rtol 1e-9 of the solver, over 20 restarts.
+    It rests with the first rebound e^n v_1 below the rest speed. Closed form of the law of impact;
+    tolerance: rtol 1e-9 of the solver, over 20 restarts.
     """
     e, h, g, rest = 0.8, 1.0, 9.81, 0.05
     result = alone(BouncingBall, restitution=e, rest_speed=rest).simulate(6.0, solver=solver, rtol=1e-9)
@@ -904,7 +936,8 @@ def test_mass_with_stops_bounces_and_rests():
     mass = {"type": "mass_with_stops", "mass": f"{m} kg", "low": "0 mm", "high": "2 m", "restitution": e,
             "rest_speed": f"{rest} m/s", "start": {"x": "1 m"}}  # fmt: skip
     weight = {"type": "force_source", "force": f"{-m * g} N"}
-    result = circuit(components={"mass": mass, "weight": weight}, nets={"rod": ["mass.port", "weight.rod"]}).simulate(3.0, rtol=1e-9)
+    run = circuit(components={"mass": mass, "weight": weight}, nets={"rod": ["mass.port", "weight.rod"]})
+    result = run.simulate(3.0, rtol=1e-9)
     t1, v1 = math.sqrt(2 / g), math.sqrt(2 * g)
     bounces = math.ceil(math.log(rest / v1) / math.log(e))
     expected = t1 + np.concatenate(([0.0], np.cumsum([2 * e**n * v1 / g for n in range(1, bounces)])))
@@ -925,8 +958,9 @@ def test_stick_slip(solver):
     m, k, V, coulomb, static = 0.5, 200.0, 0.1, 1.0, 3.0
     w, A = math.sqrt(k / m), (static - coulomb) / k
     slip, stick = 2 * (math.pi - math.atan(A * w / V)) / w, 2 * A / V
+    friction = {"coulomb_friction": f"{coulomb} N", "static_friction": f"{static} N"}
     parts = {
-        "mass": {"type": "stick_slip_mass", "mass": f"{m} kg", "coulomb_friction": f"{coulomb} N", "static_friction": f"{static} N"},
+        "mass": {"type": "stick_slip_mass", "mass": f"{m} kg", **friction},
         "spring": {"type": "spring_between", "stiffness": f"{k} N/m"},
         "belt": {"type": "motion_source", "velocity": f"{V} m/s"},
     }
@@ -944,13 +978,10 @@ def test_stick_slip(solver):
 
 def valve_on(source, **nets_of):
     """The shipped relief valve on a source of pressure."""
-    from crescentlab.circuit import find
-
     folder = find("relief_valve").parent
-    oil = {"type": "simple_oil", "density": "860 kg/m^3", "kinematic_viscosity": "35 cSt", "bulk_modulus": "14000 bar"}
-    parts = {**source, "valve": {"type": "./relief_valve_part.yaml", "cracking_pressure": "6.5 bar"}, "tank": {"type": "tank"}}
+    valve = {"type": "./relief_valve_part.yaml", "cracking_pressure": "6.5 bar"}
     nets = {"p_in": ["source.port", "valve.inlet"], "p_out": ["valve.outlet", "tank.port"], **nets_of}
-    return circuit(components=parts, nets=nets, fluid=oil, folder=folder)
+    return circuit(components={**source, "valve": valve, "tank": {"type": "tank"}}, nets=nets, fluid=OIL, folder=folder)
 
 
 def test_a_valve_on_its_seat_makes_no_events():
@@ -987,7 +1018,7 @@ class Shift(Component):
 
 @pytest.mark.parametrize("size", [0, 1, 4])
 def test_a_remap_moves_a_chain_along_by_one(size):
-    """After k shifts volume j holds what entered at shift k + 1 - j, here its time k + 1 - j; also with none and one."""
+    """After k shifts volume j holds what entered at shift k + 1 - j: the time k + 1 - j; also with none or one."""
     result = alone(Shift, size=size).simulate(7.5, rtol=1e-9)
     times = fired(result, "part.shift")
     assert times == pytest.approx(np.arange(1, 8), abs=1e-9)
@@ -999,9 +1030,9 @@ def test_a_remap_moves_a_chain_along_by_one(size):
 def test_carry_over_chain_shifts():
     """A chain without leakage carries the suction's pressure: after each pitch it has moved up by one volume."""
     pitch, speed = 30.0, 100.0
-    chain = {"type": "carry_over_chain", "volumes": 3, "volume": "1 cm^3", "pitch": f"{pitch} deg", "extension": "100 deg",
-             "gap_height": "0 mm", "gap_length": "1 mm", "thickness": "10 mm", "tip_radius": "20 mm",
-             "start": {"p": ["3 bar", "2 bar", "1 bar"]}}  # fmt: skip
+    chain = {"type": "carry_over_chain", "volumes": 3, "volume": "1 cm^3", "pitch": f"{pitch} deg",
+             "extension": "100 deg", "gap_height": "0 mm", "gap_length": "1 mm", "thickness": "10 mm",
+             "tip_radius": "20 mm", "start": {"p": ["3 bar", "2 bar", "1 bar"]}}  # fmt: skip
     parts = {
         "chain": chain, "drive": {"type": "speed_source", "speed": f"{speed} rad/s"}, "angle": {"type": "angle_sensor"},
         "suction": {"type": "tank", "pressure": "0.5 bar"}, "delivery": {"type": "tank", "pressure": "5 bar"},
@@ -1010,9 +1041,8 @@ def test_carry_over_chain_shifts():
         "s": ["suction.port", "chain.suction"], "d": ["delivery.port", "chain.delivery"], "c": ["chain.chain"],
         "shaft": ["drive.shaft", "angle.shaft", "chain.shaft"], "phase": ["angle.y", "chain.phase"],
     }  # fmt: skip
-    oil = {"type": "simple_oil", "density": "860 kg/m^3", "kinematic_viscosity": "35 cSt", "bulk_modulus": "14000 bar"}
     step = math.radians(pitch) / speed
-    result = circuit(components=parts, nets=nets, fluid=oil).simulate(2.5 * step, rtol=1e-8)
+    result = circuit(components=parts, nets=nets, fluid=OIL).simulate(2.5 * step, rtol=1e-8)
     assert fired(result, "chain.closes") == pytest.approx([step, 2 * step], abs=1e-11)
     (before, after), bar = rows_at(result, fired(result, "chain.closes")[0]), 1e5
     np.testing.assert_allclose(result["chain.p"][before][:2], [3 * bar, 2 * bar], rtol=1e-9)

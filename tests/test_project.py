@@ -20,7 +20,7 @@ ROOT = Path(__file__).resolve().parents[1]
 LAYERS: tuple[tuple[str, ...], ...] = (
     ("errors", "symbols", "units", "maths", "prepared"),
     ("tables", "fluid", "domain", "component"),
-    ("expressions", "yaml_text", "library", "netlist"),
+    ("expressions", "yaml_text", "explain", "library", "netlist"),
     ("elaborate",),
     ("graph", "trace"),
     ("causality",),

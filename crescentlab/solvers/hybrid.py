@@ -37,6 +37,7 @@ class Hybrid:
         self.bits_info = system.bits
         self.f = Evaluator(system.rhs, values.p)
         self._relation = Evaluator(system.relation, values.p)
+        self._watched = Evaluator(system.relation_on_state, values.p)
         self.condition = Evaluator(system.condition, values.p)
         self.n = len(system.bits.names)
         self.b = np.zeros(self.n)
@@ -66,6 +67,10 @@ class Hybrid:
         """Relations, their rates and magnitudes; ``rate`` is dx/dt where the caller knows it."""
         known = self.f(t, x, self.h, self.b)[0] if rate is None else rate
         return self._relation(t, x, self.h, self.b, known)
+
+    def watch(self, t: float, x: np.ndarray, rate: np.ndarray) -> list[np.ndarray]:
+        """The same of the relations on states alone."""
+        return self._watched(t, x, self.h, self.b, rate)
 
     # -- settling --------------------------------------------------------------------------------
 

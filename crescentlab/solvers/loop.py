@@ -26,8 +26,11 @@ SMALLEST_STEP = 1e-14
 """Steps below this share of the span, many in a row, are a collapse."""
 COLLAPSE_COUNT = 500
 CLOCK_POINTS = 4097
-RESTART_SHARE = 0.1
-"""A change of f that moves no state by more than this share of its tolerance over a step needs no restart."""
+CLOCK_SWING = 0.5
+"""In one step no value that depends on time alone swings by more than this share of its range."""
+RESTART_SHARE = 1e-3
+"""A change of f that moves no state by more than this share of its tolerance over a step needs no restart; a sampled
+part makes thousands of such changes, and their sum must stay within the tolerance."""
 
 
 @dataclass(frozen=True)
@@ -70,7 +73,8 @@ class _Run:
         self.limits = _PressureLimits(system)
         self.rate = np.zeros(self.functions.n)
         """dx/dt at the end of the last step."""
-        self.step_cap = min(options.max_step or np.inf, self.clock_cap(), (options.stop - options.start) / 50)
+        self.step_cap = min(options.max_step or np.inf, (options.stop - options.start) / 50)
+        self.pace = self.clock_pace()
         self.tiny = 0
         self.shown_at = 0.0
 
@@ -78,19 +82,19 @@ class _Run:
     def span(self) -> float:
         return self.options.stop - self.options.start
 
-    def clock_cap(self) -> float:
-        """A quarter of the shortest swing of any value that depends on time alone."""
+    def clock_pace(self) -> tuple[np.ndarray, np.ndarray] | None:
+        """Times, and how far values that depend on time alone have swung until then, in shares of their range."""
         clock = self.system.clock
         if not clock.numel():
-            return np.inf
-        rates = ca.Function("clock", self.system.arguments, [ca.jacobian(clock, self.system.t)])
+            return None
+        values = ca.Function("clock", self.system.arguments, [clock])
         times = np.linspace(self.options.start, self.options.stop, CLOCK_POINTS)
         v = self.values
         with np.errstate(all="ignore"):
-            rate = np.array(rates(times.reshape(1, -1), v.x0, v.h0, np.zeros(self.system.b.numel()), v.p))
-        turns = np.diff(np.sign(rate), axis=1) != 0
-        gaps = [np.diff(times[1:][row]).min() for row in turns if row.sum() > 1]
-        return min(gaps) / 2 if gaps else np.inf
+            swing = np.array(values(times.reshape(1, -1), v.x0, v.h0, np.zeros(self.system.b.numel()), v.p))
+            shares = np.abs(np.diff(swing, axis=1)) / np.ptp(swing, axis=1, keepdims=True)
+        shares = shares[np.isfinite(shares).all(axis=1)]
+        return (times, np.concatenate(([0.0], np.cumsum(shares.max(axis=0))))) if shares.size else None
 
     # -- the run ---------------------------------------------------------------------------------
 
@@ -166,7 +170,7 @@ class _Run:
     def to_goal(self, t: float, x: np.ndarray, goal: float) -> tuple[float, np.ndarray]:
         """Step until the goal or an event in between; handle it; return where we are then."""
         while True:
-            bound = min(goal, t + self.cap())
+            bound = min(goal, t + self.cap(t))
             if goal - bound < 1e-9 * (goal - t):
                 bound = goal
             self.step(bound)
@@ -176,17 +180,23 @@ class _Run:
             event = self.roots.first(low, high, x_high, self.rate, self.stepper.interpolant)
             self.fill(low, high if event is None else event)
             if event is not None:
-                return self.inside(event, high, x_high)
+                return self.inside(event, high, x_high, goal)
             if high >= goal - self.hybrid.time_tolerance:
-                return self.at_goal(goal, x_high)
+                return self.reached(high, x_high, goal)
             self.record(high, x_high)
             t = high
             self.report(t)
 
-    def cap(self) -> float:
+    def cap(self, t: float) -> float:
         """Longest step from here."""
-        fastest = max((abs(self.rate[k]) for k in self.angles), default=0.0)
-        return min(self.step_cap, ANGLE_STEP / fastest) if fastest > 0 else self.step_cap
+        cap = self.step_cap
+        if self.angles and (fastest := max(abs(self.rate[k]) for k in self.angles)) > 0:
+            cap = min(cap, ANGLE_STEP / fastest)
+        if self.pace is not None:
+            times, swung = self.pace
+            ahead = float(np.interp(np.interp(t, times, swung) + CLOCK_SWING, swung, times)) - t
+            cap = min(cap, ahead) if ahead > 0 else cap
+        return cap
 
     def step(self, bound: float) -> None:
         try:
@@ -197,25 +207,31 @@ class _Run:
             raise SimulationError(f"no step is small enough ({problem}); {self.blame(t, x)}") from None
         self.statistics.steps += 1
 
-    def inside(self, t: float, high: float, x_high: np.ndarray) -> tuple[float, np.ndarray]:
+    def inside(self, t: float, high: float, x_high: np.ndarray, goal: float) -> tuple[float, np.ndarray]:
         """An event inside the last step, at t <= high."""
         path = self.stepper.interpolant()
         x = np.array(path(t)) if t < high else x_high
         x_after, kept = self.handle(t, x, [])
         if kept and t < high:
-            kept = not self.f_differs(high, x_high)
+            kept = self.goes_on(high, x_high)
             if kept and not self.hybrid.finished:
                 self.roots.begin(t, x_after, self.functions.rhs(t, x_after))
                 event = self.roots.first(t, high, x_high, self.stepper.rate(), self.stepper.interpolant)
                 self.fill(t, high if event is None else event)
                 if event is not None:
-                    return self.inside(event, high, x_high)
-                self.record(high, x_high)
-                return high, x_high
+                    return self.inside(event, high, x_high, goal)
+                return self.reached(high, x_high, goal)
         if not kept and not self.hybrid.finished and t < self.options.stop:
             self.statistics.restarts += 1
             self.started(t, x_after)
         return t, x_after
+
+    def reached(self, high: float, x_high: np.ndarray, goal: float) -> tuple[float, np.ndarray]:
+        """The end of a step with nothing left inside it; what waits at the goal is done if it is the goal."""
+        if high >= goal - self.hybrid.time_tolerance:
+            return self.at_goal(goal, x_high)
+        self.record(high, x_high)
+        return high, x_high
 
     def at_goal(self, t: float, x: np.ndarray) -> tuple[float, np.ndarray]:
         """The goal of the last step: ticks, time events, or the end."""
@@ -243,16 +259,20 @@ class _Run:
         jumped = x_after is not x and not np.array_equal(x_after, x)
         self.check_finite(t, x_after, x_after, "after an event")
         self.record(t, x_after, jump=True)
-        return x_after, not jumped and not self.f_differs(t, x_after)
+        return x_after, not jumped and self.goes_on(t, x_after)
 
-    def f_differs(self, t: float, x: np.ndarray) -> bool:
-        """Whether f with the new bits and held values differs from f with the old ones by a share of the tolerance."""
+    def goes_on(self, t: float, x: np.ndarray) -> bool:
+        """Whether f with the new bits and held values is the old f but for a share of the tolerance."""
         if not self.functions.n:
-            return False
+            return True
         new = self.functions.rhs(t, x)
         old = self.functions.f(t, x, self.old_h, self.old_b)[0]
-        step = self.stepper.step_size or 0.0
-        return bool(np.any(np.abs(new - old) * step > RESTART_SHARE * (self.atol + self.options.rtol * np.abs(x))))
+        allowed = RESTART_SHARE * (self.atol + self.options.rtol * np.abs(x))
+        if np.any(np.abs(new - old) * (self.stepper.step_size or 0.0) > allowed):
+            return False
+        if t == self.stepper.t:
+            self.stepper.refresh(new)
+        return True
 
     # -- books -----------------------------------------------------------------------------------
 

@@ -25,7 +25,6 @@ class RootFinder:
     def __init__(self, hybrid: Hybrid) -> None:
         self.hybrid = hybrid
         self.watched = hybrid.watched
-        self.every = self.watched.size == hybrid.n
         self.side = np.zeros(self.watched.size)
         """+1 where a watched bit is true, -1 where it is false."""
         self.before = np.zeros(self.watched.size)
@@ -35,11 +34,8 @@ class RootFinder:
 
     def read(self, t: float, x: np.ndarray, rate: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Distances of the watched relations from turning, their rates, and roundoff."""
-        g, slope, scale = self.hybrid.relation(t, x, rate)
-        if self.every:
-            return self.side * g, self.side * slope, (16 * EPS) * scale
-        w = self.watched
-        return self.side * g[w], self.side * slope[w], 16 * EPS * scale[w]
+        g, slope, scale = self.hybrid.watch(t, x, rate)
+        return self.side * g, self.side * slope, (16 * EPS) * scale
 
     def begin(self, t: float, x: np.ndarray, rate: np.ndarray) -> None:
         """Remember the values at the beginning of a step, after a stop."""
@@ -120,9 +116,15 @@ class _Course:
         g, _, scale = self.hybrid.relation(t, self.path(t), self.nothing)
         return float(self.side * g[self.place] + 16 * EPS * scale[self.place])
 
+    def both(self, t: float) -> tuple[float, float]:
+        """The distance, plus roundoff, and its rate."""
+        g, rate, scale = self.hybrid.relation(t, self.path(t))
+        k = self.place
+        return float(self.side * g[k] + 16 * EPS * scale[k]), float(self.side * rate[k])
+
     def slope(self, t: float) -> float:
         """Its rate."""
-        return float(self.side * self.hybrid.relation(t, self.path(t))[1][self.place])
+        return self.both(t)[1]
 
     def turned(self, t: float, *, heading: bool) -> bool:
         """Whether settling at ``t`` would turn the relation; with ``heading``, only if it moves that way."""
@@ -132,7 +134,7 @@ class _Course:
     def first_root(self, low: float, high: float) -> float | None:
         """When it first turns in (low, high], as closely as the clock allows; at ``low`` it has been settled."""
         times = np.concatenate(([low], low + _S * (high - low), [high])).tolist()
-        values, slopes = [self.value(t) for t in times], [self.slope(t) for t in times]
+        values, slopes = zip(*[self.both(t) for t in times], strict=True)
         for j, (start, end) in enumerate(pairwise(times)):
             if values[j + 1] < 0:
                 return self.close(start, end, low, high)

@@ -156,8 +156,13 @@ class Stepper:
         if solver.status == "failed":
             raise SimulationError(str(message))
         # a step cut short by the bound says nothing about the step the error would allow
-        if solver.t < bound or self.step_size is None:
+        if solver.t < bound or self.step_size is None or solver.t - before > self.step_size:
             self.step_size = solver.t - before
+
+    def refresh(self, rate: np.ndarray) -> None:
+        """Take f at the end of the last step anew, after a change too small for a restart."""
+        if hasattr(self.solver, "f"):  # the one-step methods begin their next step with it
+            self.solver.f = self.inner(rate)
 
     def set_bound(self, bound: float) -> None:
         """Tell the solver's private parts about the bound."""
