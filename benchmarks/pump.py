@@ -22,13 +22,13 @@ import casadi as ca
 import numpy as np
 
 import crescentlab as cl
+from crescentlab.assembly import assemble
+from crescentlab.causality import plan
 from crescentlab.circuit import Circuit
 from crescentlab.elaborate import elaborate
 from crescentlab.graph import build
-from crescentlab.causality import plan
 from crescentlab.library import installed
 from crescentlab.netlist import Netlist
-from crescentlab.assembly import assemble
 from crescentlab.prepared import Prepared
 from crescentlab.system import System
 
@@ -144,7 +144,8 @@ def main() -> None:
             error = float(np.max(np.abs(mine[1] - reference)) / np.mean(reference))
             ratio = statistics.median(a / b for a, b in pairs)
             print(
-                f"{solver:8s} {statistics.median(a for a, _ in pairs):9.3f} {error:9.1e} {count.steps:7d} {count.evaluations:9d} "
+                f"{solver:8s} {statistics.median(a for a, _ in pairs):9.3f} {error:9.1e} {count.steps:7d} "
+                f"{count.evaluations:9d} "
                 f"{count.events:7d} {count.ticks:6d} {count.restarts:9d} {ratio:12.2f}"
             )
     start_up(rounds)

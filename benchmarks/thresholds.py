@@ -38,7 +38,8 @@ def circuit(kind: str, n: int) -> Circuit:
     """n volumes joined by orifices; a pulsating source at the first, a tank behind the last."""
     n = n if kind == "chain" else round(n**0.5) ** 2
     components: dict[str, object] = {
-        "tank": {"type": "tank"}, "out": {"type": "orifice", "area": "5 mm^2"}, "source": {"type": "signal_flow_source"},
+        "tank": {"type": "tank"}, "out": {"type": "orifice", "area": "5 mm^2"},
+        "source": {"type": "signal_flow_source"},
         "sine": {"type": "sine", "mean": "10 L/min", "amplitude": "5 L/min", "frequency": "200 Hz"},
     }  # fmt: skip
     nets = {f"n{k}": [f"v{k}.port"] for k in range(n)}

@@ -75,9 +75,9 @@ class CrescentGears(Component):
     mesh_start = held(Angle, "shaft angle at which the running pitch began", start=lambda c: -c.phase_at_zero)
     started = held(Ratio, "1 once mesh_start belongs to the shaft's angle", start=0.0)
 
-    dVd = observable(Displacement, "delivery volume per shaft angle")  # noqa: N815 - the symbols of Fig. 18
-    dVs = observable(Displacement, "suction volume per shaft angle")  # noqa: N815
-    dVt = observable(Displacement, "trapped volume per shaft angle")  # noqa: N815
+    dVd = observable(Displacement, "delivery volume per shaft angle")
+    dVs = observable(Displacement, "suction volume per shaft angle")
+    dVt = observable(Displacement, "trapped volume per shaft angle")
     torque = observable(Torque, "torque of the shaft on the gears, positive while pumping")
     displacement = observable(Displacement, "mean volume displaced to delivery per shaft angle")
     nu_d = observable(Angle, "shaft angle since the running pitch began")

@@ -218,8 +218,8 @@ class Table(Component):
 
     .. math:: y = y_k + (y_{k+1} - y_k) \frac{u - u_k}{u_{k+1} - u_k}
 
-    u [any], y [any], in the SI units of the table's first and second column. Each knot is an event. Not for functions of
-    time: use `time_table`. Source: linear interpolation.
+    u [any], y [any], in the SI units of the table's first and second column. Each knot is an event. Not for
+    functions of time: use `time_table`. Source: linear interpolation.
     """
 
     curve: Annotated[Curve, CurveOf()] = Field(description="output over input")

@@ -80,7 +80,7 @@ class _Assembly:
             mine = self.outputs[step.instance]
             for k, element in zip(group.outputs, ca.vertsplit(result), strict=True):
                 mine[k] = element
-        for name, trace in plan.traces.items():
+        for name in plan.traces:
             self.inputs[name] = column([self.value(s) for s in plan.sources[name]])
         derivative = column(
             [self.call(n, tr.derivative, self.inputs[n]) for n, tr in plan.traces.items() if tr.states.size]

@@ -184,7 +184,8 @@ def _fluids(graph: Graph, components: dict[str, Component], library: Library) ->
                         design.instances[name].place,
                     )
                 raise InputError(
-                    f"{name}: its nets name no fluid; give one of them a fluid, for example {{fluid: {next(iter(design.fluids))}, ports: [...]}}",
+                    f"{name}: its nets name no fluid; give one of them a fluid, "
+                    f"for example {{fluid: {next(iter(design.fluids))}, ports: [...]}}",
                     design.instances[name].place,
                 )
             chosen.append(found[0])
@@ -236,7 +237,8 @@ def _fluid_of_nets(graph: Graph, components: dict[str, Component]) -> dict[str, 
             if here.name in of_net:
                 if of_net[here.name] != net.source.fluid:
                     raise InputError(
-                        f"net {here.name}: the fluids {of_net[here.name]} and {net.source.fluid} meet here; put a separator between them",
+                        f"net {here.name}: the fluids {of_net[here.name]} and {net.source.fluid} meet here; "
+                        "put a separator between them",
                         here.source.place,
                     )
                 continue

@@ -17,10 +17,10 @@ import numpy as np
 from crescentlab.component import Component, field_quantity, is_structural
 from crescentlab.domain import Held, Observable, Port, State
 from crescentlab.errors import ComponentError, ExpressionError, InputError, Place, UnitError, nearest
+from crescentlab.explain import validated
 from crescentlab.expressions import Value, evaluate, is_expression, number_of
 from crescentlab.fluid import Fluid
 from crescentlab.library import Library
-from crescentlab.explain import validated
 from crescentlab.netlist import Netlist, NetSection, net_ports
 from crescentlab.units import QUANTITIES, Quantity, is_number, parse_any
 from crescentlab.yaml_text import Node
@@ -235,8 +235,8 @@ class _Elaboration:
         self.instances[full] = Instance(full, instance, node.place, start)
 
     def subcircuit(
-        self, netlist: Netlist, file: str, node: Node, full: str, values: dict[str, Value], library: Library, overrides: _Overrides,
-        chain: tuple[Path, ...],
+        self, netlist: Netlist, file: str, node: Node, full: str, values: dict[str, Value], library: Library,
+        overrides: _Overrides,         chain: tuple[Path, ...],
     ) -> dict[str, str]:  # fmt: skip
         """Elaborate a subcircuit file; return which inner net each of its ports is."""
         place = node.place_of("type")
@@ -264,7 +264,8 @@ class _Elaboration:
                 continue
             if name == "start":
                 raise InputError(
-                    f"{full}: a subcircuit has no states of its own; start its components in {file}, by parameters of it",
+                    f"{full}: a subcircuit has no states of its own; start its components in {file}, "
+                    "by parameters of it",
                     node.place_of(name),
                 )
             if name not in part.sections.parameters:

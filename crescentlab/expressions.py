@@ -155,7 +155,7 @@ def _dotted(node: ast.AST) -> str | None:
 
 
 def _power(base: Any, exponent: float) -> Any:
-    if isinstance(base, Sym) or isinstance(base, np.ndarray):
+    if isinstance(base, (Sym, np.ndarray)):
         return base ** (int(exponent) if float(exponent).is_integer() else exponent)
     if base < 0 and not float(exponent).is_integer():
         raise ExpressionError(f"a negative number, {base:g}, to the power {exponent:g} is not a real number")
@@ -168,7 +168,8 @@ def _divide(a: Any, b: Any) -> Any:
     return a / b
 
 
-_PLAIN = {"sin": maths.sin, "cos": maths.cos, "tan": maths.tan, "asin": maths.asin, "acos": maths.acos, "atan": maths.atan,
+_PLAIN = {"sin": maths.sin, "cos": maths.cos, "tan": maths.tan, "asin": maths.asin, "acos": maths.acos,
+          "atan": maths.atan,
           "exp": maths.exp, "log": maths.log, "tanh": maths.tanh, "sinh": maths.sinh, "cosh": maths.cosh}  # fmt: skip
 _WHOLE: dict[str, Callable[[float], float]] = {"floor": math.floor, "ceil": math.ceil, "round": lambda x: round(x)}
 _SAME = {"min": maths.minimum, "max": maths.maximum}
@@ -288,9 +289,8 @@ class _Walker:
             a, b = self.alike(values[0], values[1], "compare")
             return Value(_float(maths.atan2(a.value, b.value)), QUANTITIES["angle"])
         if len(values) != 1 or name in _SAME:
-            raise self.fail(
-                f"{name} takes {'two or more arguments' if name in _SAME else 'three arguments' if name == 'where' else 'one argument'}"
-            )
+            wanted = {"where": "three arguments", "atan2": "two arguments"}.get(name, "one argument")
+            raise self.fail(f"{name} takes {'two or more arguments' if name in _SAME else wanted}")
         return self.single(name, values[0])
 
     def single(self, name: str, value: Value) -> Value:

@@ -97,7 +97,8 @@ def _unrolled(design: Design, source: DesignNet) -> list[Net]:
             )
         if n != length:
             raise InputError(
-                f"net {source.name}: {next(iter(vectors))} has {length} elements, {ref} has {n}; join vectors of equal size",
+                f"net {source.name}: {next(iter(vectors))} has {length} elements, {ref} has {n}; "
+                "join vectors of equal size",
                 ref.place,
             )
     return [
@@ -178,7 +179,8 @@ def _check_net(graph: Graph, net: Net) -> None:
     if net.domain is CHAMBER and len(net.members) != 2:
         names = ", ".join(str(m) for m in net.members)
         raise InputError(
-            f"net {net.name}: a chamber net joins exactly two ports, the part that shapes the volume and its capacity, not {names}",
+            f"net {net.name}: a chamber net joins exactly two ports, the part that shapes the volume and its capacity, "
+            f"not {names}",
             net.source.place,
         )
     if net.domain is SIGNAL:
@@ -187,6 +189,7 @@ def _check_net(graph: Graph, net: Net) -> None:
             a, b = graph.quantity(first), graph.quantity(member)
             if a != b:
                 raise InputError(
-                    f"net {net.name}: {first} carries {a.title} [{a.si}] and {member} {b.title} [{b.si}]; signals joined have one unit",
+                    f"net {net.name}: {first} carries {a.title} [{a.si}] and {member} {b.title} [{b.si}]; "
+                    "signals joined have one unit",
                     member.place,
                 )

@@ -56,7 +56,8 @@ class Library:
         for name, found in _classes(module):
             if name in components or name in fluids:
                 raise InputError(
-                    f"{path.name}: class {found.__name__} would be the type {name!r}, which already exists; rename the class",
+                    f"{path.name}: class {found.__name__} would be the type {name!r}, which already exists; "
+                    "rename the class",
                     place,
                 )
             _put(components, fluids, name, found)

@@ -168,7 +168,8 @@ class Netlist:
 
 _KINDS: dict[str, tuple[type, str]] = {
     "fluid": (dict, "{type: simple_oil, density: 860 kg/m^3}"), "fluids": (dict, "{oil: {type: simple_oil}}"),
-    "parameters": (dict, "{supply: 30 L/min}"), "components": (dict, "{tank: {type: tank}}"), "ports": (dict, "{inlet: p_line}"),
+    "parameters": (dict, "{supply: 30 L/min}"), "components": (dict, "{tank: {type: tank}}"),
+    "ports": (dict, "{inlet: p_line}"),
     "nets": (dict, "{p_line: [pump.port, line.port]}"), "outputs": (dict, "{loss: '= line.p * valve.q'}"),
     "simulation": (dict, "{stop: 50 ms}"), "display": (dict, "{pressure: bar}"),
     "plots": (list, "[{y: [line.p]}]"), "library": (list, "[./my_components.py]"),

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import csv
 from dataclasses import dataclass
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -108,7 +109,7 @@ def _curve(xs: list[float], ys: list[float], x: Quantity, y: Quantity, places: l
     if len(xs) > MAX_POINTS:
         raise InputError(f"{len(xs)} points; a curve may have {MAX_POINTS}, so thin it out")
     unit = next(iter(x.units))
-    for k, (first, second) in enumerate(zip(xs[:-1], xs[1:], strict=True)):
+    for k, (first, second) in enumerate(pairwise(xs)):
         if not second > first:
             said = f"x must rise from point to point, but {x.show(second, unit)} follows {x.show(first, unit)}"
             raise InputError(f"{said}; sort the points", places[k + 1] if places else None)

@@ -284,9 +284,11 @@ class _Tracing:
             else ca.SX(0, 1)
         )
         return Trace(
-            self.cls, self.states, self.held, self.inputs, self.outputs, self.observables, self.parameters, self.fluid_names,
+            self.cls, self.states, self.held, self.inputs, self.outputs, self.observables, self.parameters,
+            self.fluid_names,
             tuple(self.groups(y, function)), function("der", derivative), function("obs", observable), tuple(infos),
-            function("rel", ca.horzcat(column(relations), column(scales))), tuple(events), function("cond", column(conditions)),
+            function("rel", ca.horzcat(column(relations), column(scales))), tuple(events),
+            function("cond", column(conditions)),
             function("period", column(periods)), function("clock", clock),
         )  # fmt: skip
 
@@ -375,7 +377,7 @@ def _time_only(value: ca.SX, t: ca.SX, others: ca.SX) -> ca.SX:
 
     Walks the instructions once, marking each result by what it depends on.
     """
-    free = [s for s in ca.symvar(value)]
+    free = list(ca.symvar(value))
     walk = ca.Function("walk", free, [value])
     names = [s.name() for s in free]
     other_names = {s.name() for s in ca.symvar(others)}

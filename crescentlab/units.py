@@ -232,7 +232,8 @@ rotary_damping = _quantity(
 )  # fmt: skip
 flow_resistance = _quantity(
     "flow_resistance", "Pa s/m^3", (1, -4, -1, 0), _BAR / _LPM,
-    {"bar/(L/min)": _BAR / _LPM, "Pa s/m3": 1.0, "bar/(l/min)": _BAR / _LPM, "Pa/(m3/s)": 1.0, "bar min/L": _BAR / _LPM},
+    {"bar/(L/min)": _BAR / _LPM, "Pa s/m3": 1.0, "bar/(l/min)": _BAR / _LPM, "Pa/(m3/s)": 1.0,
+     "bar min/L": _BAR / _LPM},
 )  # fmt: skip
 quadratic_resistance = _quantity(
     "quadratic_resistance", "Pa s^2/m^6", (1, -7, 0, 0), _BAR / _LPM**2,

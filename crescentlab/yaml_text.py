@@ -54,9 +54,9 @@ class Node:
         """The node at ``path``, or the deepest one on the way to it."""
         node = self
         for step in path:
-            if isinstance(node.value, dict) and step in node.value:
-                node = node.value[step]
-            elif isinstance(node.value, list) and isinstance(step, int) and step < len(node.value):
+            if (isinstance(node.value, dict) and step in node.value) or (
+                isinstance(node.value, list) and isinstance(step, int) and step < len(node.value)
+            ):
                 node = node.value[step]
             else:
                 break
@@ -120,35 +120,35 @@ def _explained(error: yaml.MarkedYAMLError, lines: list[str]) -> tuple[str, int]
     flow = "flow" in (error.context or "")
     shown, first = _line(lines, line), _line(lines, begun)
     if (better := quoted(shown, flow and begun < line)) != shown:
-        return f"{MUST_QUOTE}: {better.strip()}", line
+        return f"{MUST_QUOTE}: {_cut(better)}", line
     if "\t" in shown[: len(shown) - len(shown.lstrip())]:
         return "a tab at the beginning of the line; indent with spaces", line
     if flow and (line > len(lines) or (line > begun and _indent(shown) <= _indent(first))):
-        return f"a bracket opened here is never closed; look at: {first.strip()}", begun
+        return f"a bracket opened here is never closed; look at: {_cut(first)}", begun
     if flow and ("' or '" in problem or "mapping values" in problem):
         return (
-            f"brackets do not match, a comma is missing, or text with a colon needs quotes; look at: {shown.strip()}",
+            f"brackets do not match, a comma is missing, or text with a colon needs quotes; look at: {_cut(shown)}",
             line,
         )
     if "end of stream" in problem:
-        return f"a quote opened here is never closed; look at: {first.strip()}", begun
+        return f"a quote opened here is never closed; look at: {_cut(first)}", begun
     if "expected ':'" in problem:
         if glued := re.match(r"\s*([\w.]+):(\S.*)", first):
-            return f"a blank is missing after the colon; write: {glued[1]}: {glued[2]}", begun
-        return f"a colon is missing; write: {first.strip()}:", begun
+            return f"a blank is missing after the colon; write: {glued[1]}: {_cut(glued[2])}", begun
+        return f"a colon is missing; write: {_cut(first)}:", begun
     if "mapping values" in problem:
         return (
-            f"a colon where none can stand; quote text that holds one, and look at the indentation of: {shown.strip()}",
+            f"a colon where none can stand; quote text that holds one, and look at the indentation of: {_cut(shown)}",
             line,
         )
     if "start any token" in problem and mark and mark.column < len(shown):
-        return f"text that begins with {shown[mark.column]} must be quoted; look at: {shown.strip()}", line
+        return f"text that begins with {shown[mark.column]} must be quoted; look at: {_cut(shown)}", line
     if "expected" in problem and not flow:
         return (
-            f"this does not continue what stands above it; look at indentation and brackets of: {shown.strip()}",
+            f"this does not continue what stands above it; look at indentation and brackets of: {_cut(shown)}",
             line,
         )
-    return f"not YAML: {problem or 'it cannot be read'}; look at: {shown.strip()}", line
+    return f"not YAML: {problem or 'it cannot be read'}; look at: {_cut(shown)}", line
 
 
 MUST_QUOTE = "text with brackets or commas inside {} or [] must be quoted; write"
@@ -156,6 +156,12 @@ MUST_QUOTE = "text with brackets or commas inside {} or [] must be quoted; write
 
 def _line(lines: list[str], number: int) -> str:
     return lines[number - 1] if 0 < number <= len(lines) else ""
+
+
+def _cut(line: str) -> str:
+    """A line as messages show it."""
+    text = line.strip()
+    return text if len(text) <= 300 else f"{text[:300]} ..."
 
 
 def _indent(line: str) -> int:
@@ -231,7 +237,9 @@ class _Builder:
                 self.add(self.anchors[event.anchor], None, event)
             elif isinstance(event, (yaml.MappingStartEvent, yaml.SequenceStartEvent)):
                 if len(self.stack) >= MAX_DEPTH:
-                    raise InputError(f"nested deeper than {MAX_DEPTH} levels", self.place(event))
+                    raise InputError(
+                        f"nested deeper than {MAX_DEPTH} levels; look for brackets left open", self.place(event)
+                    )
                 kind: dict[str, Node] | list[Node] = {} if isinstance(event, yaml.MappingStartEvent) else []
                 self.stack.append((Node(kind, self.place(event)), event.anchor, None))
                 self.flow += 1 if event.flow_style else 0
@@ -282,18 +290,14 @@ class _Builder:
         if not isinstance(node.value, str):
             better = quoted(line, self.continued(event))
             raise InputError(
-                f"{MUST_QUOTE}: {better.strip()}"
-                if better != line
-                else f"a key must be a word; look at: {line.strip()}",
+                f"{MUST_QUOTE}: {_cut(better)}" if better != line else f"a key must be a word; look at: {_cut(line)}",
                 self.place(event),
             )
-        if not event.style and (bracket := re.match(r"([\w.]+)\s+([\[{].*)", node.value)):
-            raise InputError(
-                f"a colon is missing before the bracket; write: {bracket[1]}: {line.strip().removeprefix(bracket[1]).strip()}",
-                node.place,
-            )
+        if not event.style and (bracket := re.match(r"([\w.]+)\s+[\[{]", node.value)):
+            better = line.replace(bracket[1], f"{bracket[1]}:", 1)
+            raise InputError(f"a colon is missing before the bracket; write: {_cut(better)}", node.place)
         if not event.style and (glued := re.match(r"([A-Za-z_][\w.]*):(\S.*)", node.value)):
-            raise InputError(f"a blank is missing after the colon; write: {glued[1]}: {glued[2]}", node.place)
+            raise InputError(f"a blank is missing after the colon; write: {glued[1]}: {_cut(glued[2])}", node.place)
         if node.value in parent.keys:
             first = parent.keys[node.value]
             raise InputError(
@@ -309,7 +313,7 @@ class _Builder:
         line = _line(self.lines, place.line)
         better = quoted(line, self.continued(event))
         if better != line:
-            raise InputError(f"{MUST_QUOTE}: {better.strip()}", place)
+            raise InputError(f"{MUST_QUOTE}: {_cut(better)}", place)
         before, node = next(reversed(parent.items()), ("", Node("")))
         hint = ""
         if isinstance(node.value, str) and before and not line[: event.start_mark.column].rstrip().endswith(":"):

@@ -21,7 +21,8 @@ FORMS = {f.type_name(): f for cls in LIBRARY.components.values() for f in cls.fo
 FLUIDS = {
     "simple_oil": {"density": 860.0, "kinematic_viscosity": 35e-6, "bulk_modulus": 1.4e9},
     "aerated_oil": {
-        "density": 860.0, "kinematic_viscosity": 35e-6, "bulk_modulus": 1.4e9, "air_fraction": 0.005, "saturation_pressure": 1e8,
+        "density": 860.0, "kinematic_viscosity": 35e-6, "bulk_modulus": 1.4e9, "air_fraction": 0.005,
+        "saturation_pressure": 1e8,
     },
 }  # fmt: skip
 SETTINGS: dict[str, dict[str, object]] = {

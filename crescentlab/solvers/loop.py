@@ -310,7 +310,7 @@ class _Run:
             self.grid_count += 1
 
     def finish_grid(self, t: float, x: np.ndarray) -> None:
-        assert self.grid is not None and self.options.output_step is not None
+        assert self.grid is not None
         if not self.grid.t or t > self.grid.t[-1] + self.hybrid.time_tolerance:
             self.grid.add(t, x, self.hybrid.h, self.hybrid.b)
 
@@ -358,7 +358,8 @@ class _Run:
             name = self.system.state_names[int(bad[0])]
             what = "is no longer a finite number" if values is x else "has a rate that is not a finite number"
             raise SimulationError(
-                f"{name} {what} {when + ' ' if when else ''}(t = {t:.6g} s); look at the parameters of {name.rpartition('.')[0]} and at the start values"
+                f"{name} {what} {when + ' ' if when else ''}(t = {t:.6g} s); "
+                f"look at the parameters of {name.rpartition('.')[0]} and at the start values"
             )
 
     def blame(self, t: float, x: np.ndarray) -> str:

@@ -31,7 +31,8 @@ MULTISTEP_SHARE = 0.2
 Runge-Kutta methods (benchmarks/pump.py)."""
 
 METHODS: dict[str, Any] = {
-    "bdf": integrate.BDF, "radau": integrate.Radau, "rk45": integrate.RK45, "dop853": integrate.DOP853, "lsoda": integrate.LSODA,
+    "bdf": integrate.BDF, "radau": integrate.Radau, "rk45": integrate.RK45, "dop853": integrate.DOP853,
+    "lsoda": integrate.LSODA,
 }  # fmt: skip
 
 
