@@ -373,7 +373,7 @@ def _text(relation: Relation) -> str:
 
 
 def _time_only(value: ca.SX, t: ca.SX, others: ca.SX) -> ca.SX:
-    """The largest subexpressions of ``value`` that depend on t and on none of ``others``.
+    """The largest subexpressions of ``value`` that depend on t, in a curve, and on none of ``others``.
 
     Walks the instructions once, marking each result by what it depends on.
     """
@@ -409,7 +409,9 @@ def _time_only(value: ca.SX, t: ca.SX, others: ca.SX) -> ca.SX:
                 expressions[outs[0]] = (
                     ca.SX.unary(op, values[0]) if len(values) == 1 else ca.SX.binary(op, values[0], values[1])
                 )
-    return column(found)
+    values = column(found)
+    curved = ca.which_depends(values, t, 2, True) if values.numel() else []
+    return column([values[k] for k in range(values.numel()) if curved[k]])  # a straight line swings never
 
 
 def quantities(component: Component, kind: type[State] | type[Held] | type[Observable]) -> dict[str, Quantity]:
