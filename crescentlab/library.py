@@ -115,10 +115,12 @@ def _load_file(path: Path, place: Place | None) -> ModuleType:
         raise InputError(f"{path.name}: {error}", place) from None
     except (Exception, SystemExit) as error:  # whatever a user's file raises is the user's to mend
         frames = [f for f in traceback.extract_tb(error.__traceback__) if f.filename == str(path.resolve())]
-        line = frames[-1].lineno if frames else getattr(error, "lineno", None)
-        where = f" (line {line})" if line else ""
-        said = f"{type(error).__name__}: {error}".splitlines()[0].removesuffix(": ")
-        raise InputError(f"the library file {path.name} does not import: {said}{where}; mend it", place) from None
+        line = error.lineno if isinstance(error, SyntaxError) else frames[-1].lineno if frames else None
+        said = " ".join((error.msg if isinstance(error, SyntaxError) else str(error)).split())
+        where = f", line {line}" if line else ""
+        raise InputError(
+            f"the library file {path.name}{where} does not import: {type(error).__name__}: {said}", place
+        ) from None
 
 
 @cache

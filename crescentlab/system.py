@@ -208,7 +208,13 @@ class System:
                 _start(instance.start, s, component, mine, name, instance.place) for s in type(component).declared(Held)
             ]
         p += [float(design.parameters[scope][name].value) for scope, name in self.output_parameters]
-        return Values(np.array(p), _join(x0), _join(h0))
+        values = Values(np.array(p), _join(x0), _join(h0))
+        ticks = [event.name for event in self.events if event.kind == "every"]
+        for tick, period in zip(ticks, np.array(self.period(values.p)).ravel() if ticks else (), strict=True):
+            if not period > 0:
+                place = design.instances[tick.rpartition(".")[0]].place
+                raise InputError(f"{tick}: its period is {period:g} s; it must be above 0", place)
+        return values
 
 
 def _start(

@@ -245,7 +245,8 @@ class _Tracing:
         except ComponentError:
             raise
         except Exception as error:  # the author's slip, told in the author's words
-            raise self.fail(f"its equations do not work on symbols: {type(error).__name__}: {error}") from error
+            said = " ".join(str(error).split())
+            raise self.fail(f"its equations do not work on symbols: {type(error).__name__}: {said}") from error
         finally:
             TRACER.reset(token)
             EQUALITIES.reset(equalities)
@@ -300,7 +301,10 @@ class _Tracing:
         """The named values as one column, each of its declared size."""
         parts_: list[ca.SX] = []
         for name, n in layout.slots:
-            value = Sym.of(returned[name])
+            try:
+                value = Sym.of(returned[name])
+            except (TypeError, ValueError):
+                raise self.fail(f"{name} is {returned[name]!r}, not a number or an expression") from None
             if value.shape == () and n is not None:
                 value = value + Sym.of(np.zeros(n))
             if value.shape != (() if n is None else (n,)):
