@@ -413,9 +413,9 @@ def _time_only(value: ca.SX, t: ca.SX, others: ca.SX) -> ca.SX:
                 expressions[outs[0]] = (
                     ca.SX.unary(op, values[0]) if len(values) == 1 else ca.SX.binary(op, values[0], values[1])
                 )
-    values = column(found)
-    curved = ca.which_depends(values, t, 2, True) if values.numel() else []
-    return column([values[k] for k in range(values.numel()) if curved[k]])  # a straight line swings never
+    alone = column(found)
+    curved = ca.which_depends(alone, t, 2, True) if found else []
+    return column([alone[k] for k, bent in enumerate(curved) if bent])  # a straight line swings never
 
 
 def quantities(component: Component, kind: type[State] | type[Held] | type[Observable]) -> dict[str, Quantity]:

@@ -45,7 +45,10 @@ NOT_YAML = {
     "indentation": ((TANK, f" {TANK} <--"), "look at indentation and brackets of: tank"),
     "no colon": (("nets:", "nets <--"), "a colon is missing; write: nets:"),
     "no colon before a bracket": ((TANK, "  tank {type: tank} <--"), "write: tank: {type: tank}"),
-    "no blank after a colon": (("stop: 10 ms}", "stop:10 ms} <--"), "a blank is missing after the colon; write: stop: 10 ms"),
+    "no blank after a colon": (
+        ("stop: 10 ms}", "stop:10 ms} <--"),
+        "a blank is missing after the colon; write: stop: 10 ms",
+    ),
     "no blank in a block": ((f"{SUPPLY}\n", f"{SUPPLY}\n  other:3 bar <--\n"), "write: other: 3 bar"),
     "colon in a text": (("crescentlab: 1", "crescentlab: 1\ntitle: Valve: open <--"), "quote text that holds one"),
     "quote left open": ((SUPPLY, "  supply: '30 L/min <--"), "a quote opened here is never closed"),
@@ -70,12 +73,15 @@ FILES = {
     "two documents": (f"{CIRCUIT}--- <--\na: 1\n", "two YAML documents; keep one"),
     "empty": (" <--", "the file is empty"),
     "only a comment": ("# nothing <--\n", "the file is empty"),
-    "no version": (edited(("crescentlab: 1\nfluid", "fluid"), ("bar}", "bar} <--")), "begin the file with `crescentlab: 1`"),
+    "no version": (
+        edited(("crescentlab: 1\nfluid", "fluid"), ("bar}", "bar} <--")),
+        "begin the file with `crescentlab: 1`",
+    ),
     "other version": (edited(("crescentlab: 1", "crescentlab: 2 <--")), "must be '1', not '2'"),
     "deep lists": (f"{'[' * 100_000} <--", "nested deeper than 40 levels"),
     "deep keys": (f"{'{a: ' * 100_000} <--", "nested deeper than 40 levels"),
     "python object": ("!!python/object/apply:os.system ['echo x'] <--", "a circuit file is a mapping"),
-}  # fmt: skip
+}
 
 
 @pytest.mark.parametrize(("text", "said"), FILES.values(), ids=FILES)
@@ -116,13 +122,21 @@ def test_anchors_that_explode(refused: Refusal, form: str) -> None:
 
 SLIPS = [
     (HOLE, "{type: orifice, area: = max(1 mm^2, 5 mm^2)}", "{type: orifice, area: '= max(1 mm^2, 5 mm^2)'}"),
-    (HOLE, "{area: = 2 * max(supply, min(supply, 1)) + 1, type: orifice}", "{area: '= 2 * max(supply, min(supply, 1)) + 1',"),
+    (
+        HOLE,
+        "{area: = 2 * max(supply, min(supply, 1)) + 1, type: orifice}",
+        "{area: '= 2 * max(supply, min(supply, 1)) + 1',",
+    ),
     (T_LINE, "[driver.chain[1], tank.port]", "['driver.chain[1]', tank.port]"),
     (T_LINE, "{fluid: oil, ports: [tank.port, hole.b[*]]}", "{fluid: oil, ports: [tank.port, 'hole.b[*]']}"),
     (STOP, "{stop: 10 ms, stop_when: chain.p[2] > 3 bar}", "{stop: 10 ms, stop_when: 'chain.p[2] > 3 bar'}"),
     (STOP, "{stop: 10 ms, stop_when: = chain.p[2] * 2 > 3 bar}", "stop_when: '= chain.p[2] * 2 > 3 bar'}"),
-    (SUPPLY, "[{y: [chain.p[1], line.p]}, {y: chain.p[3], title: Hole}]", "[{y: ['chain.p[1]', line.p]}, {y: 'chain.p[3]',"),
-]  # fmt: skip
+    (
+        SUPPLY,
+        "[{y: [chain.p[1], line.p]}, {y: chain.p[3], title: Hole}]",
+        "[{y: ['chain.p[1]', line.p]}, {y: 'chain.p[3]',",
+    ),
+]
 
 
 @pytest.mark.parametrize(("line", "wrong", "right"), SLIPS)
@@ -145,7 +159,14 @@ def test_a_slip_in_a_later_line_of_braces(refused: Refusal) -> None:
 
 
 @pytest.mark.parametrize(
-    "line", ["p: [a.b, 'c.d[1]']", "title: a [1], b", "x: {y: z} # see c.d[1]", "- {a: 'it''s, so', b: \"[1]\"}", "x: {y: = f(a"]
+    "line",
+    [
+        "p: [a.b, 'c.d[1]']",
+        "title: a [1], b",
+        "x: {y: z} # see c.d[1]",
+        "- {a: 'it''s, so', b: \"[1]\"}",
+        "x: {y: = f(a",
+    ],
 )
 def test_what_needs_no_quotes_is_left_alone(line: str) -> None:
     assert quoted(line) == line
@@ -160,19 +181,31 @@ VALUES = {
     "unknown fluid parameter": (("bar}", "bar, densty: 3} <--"), "fluid: unknown key 'densty': did you mean density"),
     "unknown type": ((HOLE, "  hole: {type: orifce} <--"), "unknown component type 'orifce': did you mean orifice"),
     "a fluid as component": ((TANK, "  tank: {type: simple_oil} <--"), "it is a fluid; name it under fluid:"),
-    "unknown fluid type": (("simple_oil, density: 860 kg/m^3,", "simple_oli, <--"), "'simple_oli': did you mean simple_oil"),
+    "unknown fluid type": (
+        ("simple_oil, density: 860 kg/m^3,", "simple_oli, <--"),
+        "'simple_oli': did you mean simple_oil",
+    ),
     "no type": ((TANK, "  tank: {} <--"), "components.tank.type is missing; write for example type: orifice"),
     "no fluid type": (("type: simple_oil, density: 860 kg/m^3,", "density: 3 <--,"), "the fluid needs a type"),
-    "missing parameter": (("volume: 70 cm^3, start: {p: 1 bar}}", "start: {p: 1 bar}} <--"), "write for example volume: 1 cm3"),
+    "missing parameter": (
+        ("volume: 70 cm^3, start: {p: 1 bar}}", "start: {p: 1 bar}} <--"),
+        "write for example volume: 1 cm3",
+    ),
     "missing unit": (("5 mm^2}", "5} <--"), "hole.area: '5': an area needs a unit; write for example 5 mm2"),
     "wrong dimension": (("5 mm^2}", "5 bar} <--"), "'bar' is a unit of pressure and pressure difference, not of area"),
     "unknown unit": (("5 mm^2}", "5 mmm} <--"), "unknown unit 'mmm' for an area; write one of mm2, m2, cm2, in2"),
-    "unknown unit of a parameter": (("30 L/min", "30 l/mim <--"), "supply: '30 l/mim': unknown unit 'l/mim': did you mean l/min"),
+    "unknown unit of a parameter": (
+        ("30 L/min", "30 l/mim <--"),
+        "supply: '30 l/mim': unknown unit 'l/mim': did you mean l/min",
+    ),
     "unit of nothing near": (("30 L/min", "30 qqqq <--"), "units are bar, L/min, mm"),
     "below its bound": (("5 mm^2}", "-5 mm^2} <--"), "hole.area must be at least 0, not -5 mm2"),
     "at its bound": (("70 cm^3,", "0 cm^3, <--"), "line.volume must be above 0, not 0"),
     "beyond a limit": (("5 mm^2}", "5 mm^2, cd_max: 1.5} <--"), "hole.cd_max must be at most 1, not 1.5"),
-    "not a number": (("70 cm^3,", "much, <--"), "line.volume: 'much' is not a number with a unit; write for example 1 cm3"),
+    "not a number": (
+        ("70 cm^3,", "much, <--"),
+        "line.volume: 'much' is not a number with a unit; write for example 1 cm3",
+    ),
     "nan": (("70 cm^3,", "nan cm^3, <--"), "'nan cm^3' is not a number with a unit"),
     "inf": (("70 cm^3,", ".inf, <--"), "'.inf' is not a number with a unit"),
     "too large": (("70 cm^3,", "1e999 cm^3, <--"), "'1e999 cm^3' is not a finite number"),
@@ -186,23 +219,53 @@ VALUES = {
     "no choice": (("bar}", "bar, tension: perhaps} <--"), "fluid.tension must be true or false, not 'perhaps'"),
     "keyword as component": ((TANK, "  lambda: {type: tank} <--"), "'lambda' has a meaning of its own in expressions"),
     "keyword as parameter": ((SUPPLY, "  in: 30 L/min <--"), "'in' has a meaning of its own in expressions"),
-    "pi as parameter": ((SUPPLY, "  pi: 30 L/min <--"), "'pi' has a meaning of its own in expressions; choose another name"),
+    "pi as parameter": (
+        (SUPPLY, "  pi: 30 L/min <--"),
+        "'pi' has a meaning of its own in expressions; choose another name",
+    ),
     "not a name": ((TANK, "  my-tank: {type: tank} <--"), "'my-tank' is not a name; use letters, digits and _"),
     "component and net": (("  t_line:", "  tank: <--"), "'tank' names both a component and a net; rename one"),
     "component and parameter": ((SUPPLY, "  tank: 3 bar <--"), "'tank' names a parameter and a component or net"),
     "start of no state": (("{p: 1 bar}}", "{q: 1 bar}} <--"), "line: no state 'q' to start: known: p"),
-    "start in another unit": (("{p: 1 bar}}", "{p: 1 mm}} <--"), "line.start.p: '1 mm': 'mm' is a unit of length, not of pressure"),
+    "start in another unit": (
+        ("{p: 1 bar}}", "{p: 1 mm}} <--"),
+        "line.start.p: '1 mm': 'mm' is a unit of length, not of pressure",
+    ),
     "start without keys": (("{p: 1 bar}}", "1 bar} <--"), "start needs keys, for example start: {p: 1 bar}"),
-    "start of too many": (("{p: 1 bar}}", "{p: [1 bar, 2 bar]}} <--"), "start of p has 2 values for 1; write one for all"),
+    "start of too many": (
+        ("{p: 1 bar}}", "{p: [1 bar, 2 bar]}} <--"),
+        "start of p has 2 values for 1; write one for all",
+    ),
     "component without keys": ((TANK, "  tank: <--"), "tank needs keys, for example tank: {type: orifice"),
-    "fluid without keys": (("fluid: {type: simple_oil,", "fluid: oil <--\ntitle: {"), "fluid needs keys, for example fluid: {type"),
-    "empty net": ((f"{T_LINE}\n", f"{T_LINE}\n  none: <--\n"), "none needs a list, for example none: [pump.port, line.port]"),
-    "net of no port": ((f"{T_LINE}\n", f"{T_LINE}\n  none: [] <--\n"), "net none joins no port; list at least one or remove it"),
-    "net with an unknown key": ((T_LINE, "  t_line: {ports: [], fluit: oil} <--"), "nets.t_line: unknown key 'fluit': did you mean fluid?"),
-    "net without ports": ((T_LINE, "  t_line: {fluid: oil} <--"), "ports is missing; write for example ports: [pump.port"),
-    "no components": ((CIRCUIT[CIRCUIT.index("components") :], "components: <--\n"), "there are no components; list them"),
-    "library without a list": ((STOP, f"{STOP}\nlibrary: ./my.py <--"), "library needs a list, for example library: [./my"),
-}  # fmt: skip
+    "fluid without keys": (
+        ("fluid: {type: simple_oil,", "fluid: oil <--\ntitle: {"),
+        "fluid needs keys, for example fluid: {type",
+    ),
+    "empty net": (
+        (f"{T_LINE}\n", f"{T_LINE}\n  none: <--\n"),
+        "none needs a list, for example none: [pump.port, line.port]",
+    ),
+    "net of no port": (
+        (f"{T_LINE}\n", f"{T_LINE}\n  none: [] <--\n"),
+        "net none joins no port; list at least one or remove it",
+    ),
+    "net with an unknown key": (
+        (T_LINE, "  t_line: {ports: [], fluit: oil} <--"),
+        "nets.t_line: unknown key 'fluit': did you mean fluid?",
+    ),
+    "net without ports": (
+        (T_LINE, "  t_line: {fluid: oil} <--"),
+        "ports is missing; write for example ports: [pump.port",
+    ),
+    "no components": (
+        (CIRCUIT[CIRCUIT.index("components") :], "components: <--\n"),
+        "there are no components; list them",
+    ),
+    "library without a list": (
+        (STOP, f"{STOP}\nlibrary: ./my.py <--"),
+        "library needs a list, for example library: [./my",
+    ),
+}
 
 
 @pytest.mark.parametrize(("edit", "said"), VALUES.values(), ids=VALUES)
@@ -212,34 +275,58 @@ def test_keys_and_values(refused: Refusal, edit: tuple[str, str], said: str) -> 
 
 SETTINGS = {
     "unknown solver": ("simulation: {solver: lsodar} <--", "simulation.solver must be 'auto', 'lsoda', 'bdf', 'radau'"),
-    "negative stop": ("simulation: {stop: -1 ms} <--", "simulation.stop must be above 0, not '-1 ms'"),
-    "stop without unit": ("simulation: {stop: 10} <--", "simulation.stop: '10': a time needs a unit; write for example 10 ms"),
+    "negative stop": ("simulation: {stop: -1 ms} <--", "simulation.stop must be above 0, not -1 ms"),
+    "stop without unit": (
+        "simulation: {stop: 10} <--",
+        "simulation.stop: '10': a time needs a unit; write for example 10 ms",
+    ),
     "tolerance of 2": ("simulation: {rtol: 2} <--", "simulation.rtol must be below 1, not '2'"),
     "tolerance nan": ("simulation: {rtol: nan} <--", "simulation.rtol must be"),
     "tolerance of a word": ("simulation: {rtol: fine} <--", "simulation.rtol must be a number, not 'fine'"),
     "tolerance of rounding": ("simulation: {rtol: 1e-16} <--", "simulation.rtol must be at least 1e-13, not '1e-16'"),
     "stop_when is no condition": ("simulation: {stop_when: line.p} <--", "write for example line.p > 9 bar"),
-    "stop_when of no variable": ("simulation: {stop_when: lin.p > 1 bar} <--", "unknown name 'lin.p': did you mean line.p"),
-    "stop_when of two units": ("simulation: {stop_when: line.p > 1 mm} <--", "cannot compare a pressure [Pa] and a length [m]"),
-    "stop_when and a number": ("simulation: {stop_when: line.p > 1 bar and hole.q} <--", "where a condition such as a > b belongs"),
+    "stop_when of no variable": (
+        "simulation: {stop_when: lin.p > 1 bar} <--",
+        "unknown name 'lin.p': did you mean line.p",
+    ),
+    "stop_when of two units": (
+        "simulation: {stop_when: line.p > 1 mm} <--",
+        "cannot compare a pressure [Pa] and a length [m]",
+    ),
+    "stop_when and a number": (
+        "simulation: {stop_when: line.p > 1 bar and hole.q} <--",
+        "where a condition such as a > b belongs",
+    ),
     "display of no quantity": ("display: {presure: bar} <--", "unknown quantity 'presure': did you mean pressure"),
-    "display in another unit": ("display: {pressure: mm} <--", "display.pressure: 'mm' is a unit of length, not of pressure"),
+    "display in another unit": (
+        "display: {pressure: mm} <--",
+        "display.pressure: 'mm' is a unit of length, not of pressure",
+    ),
     "display in no unit": ("display: {pressure: baar} <--", "unknown unit 'baar' for a pressure; write one of bar, Pa"),
     "plot of no variable": ("plots: [{y: lin.p}] <--", "plots: no variable 'lin.p': did you mean line.p"),
     "plot over no variable": ("plots: [{y: line.p, x: lin.p}] <--", "plots: no variable 'lin.p': did you mean line.p"),
     "plot of no element": ("plots: [{y: 'line.p[1]'}] <--", "line.p[1]: line.p is a single value; write line.p"),
     "plot of nothing": ("plots: [{y: []}] <--", "plots[1].y needs at least 1 item"),
     "plot that is a word": ("plots: [line.p] <--", "plots[1] needs keys in braces, not 'line.p'"),
-    "plot that ends first": ("plots: [{y: line.p, start: 5 ms, stop: 1 ms}] <--", "plots[1]: start must lie before stop"),
+    "plot that ends first": (
+        "plots: [{y: line.p, start: 5 ms, stop: 1 ms}] <--",
+        "plots[1]: start must lie before stop",
+    ),
     "output of a word": ("outputs: {loss: line.p} <--", "output 'loss' must be an expression, for example loss: '= "),
-    "output of no variable": ("outputs: {loss: = lin.p} <--", "output 'loss': unknown name 'lin.p': did you mean line.p"),
-    "output named as a variable": ("outputs: {line.p: = hole.q} <--", "'line.p' has the name of an existing variable; rename it"),
+    "output of no variable": (
+        "outputs: {loss: = lin.p} <--",
+        "output 'loss': unknown name 'lin.p': did you mean line.p",
+    ),
+    "output named as a variable": (
+        "outputs: {line.p: = hole.q} <--",
+        "'line.p' has the name of an existing variable; rename it",
+    ),
     "output named as a net's": ("outputs: {p_line.p: = hole.q} <--", "'p_line.p' has the name of an existing variable"),
     "output named as the time": ("outputs: {time: = hole.q} <--", "'time' is the first column of every result"),
     "output of itself": ("outputs: {a: = b, b: = a} <--", "depends on itself"),
     "output of two units": ("outputs: {a: = line.p + hole.q} <--", "cannot add a pressure [Pa] and a flow [m^3/s]"),
     "output of three names": ("outputs: {a.b.c: = line.p} <--", "'a.b.c' is not a name"),
-}  # fmt: skip
+}
 
 
 @pytest.mark.parametrize("command", ["check", "simulate"])
@@ -276,10 +363,13 @@ def test_revolutions_a_minute_are_no_hertz() -> None:
 
 UNITS = {
     "hertz for a speed": ("speed: 33 Hz", "'Hz' is a unit of frequency, not of speed; write one of rpm"),
-    "hertz by a parameter": ("speed: = f", "gives a frequency [Hz], where a speed [rad/s] belongs; a number of it is written like 1 rpm"),
+    "hertz by a parameter": (
+        "speed: = f",
+        "gives a frequency [Hz], where a speed [rad/s] belongs; a number of it is written like 1 rpm",
+    ),
     "torque for a speed": ("speed: 5 Nm", "'Nm' is a unit of torque"),
     "angle for a speed": ("speed: 5 deg", "'deg' is a unit of angle, not of speed"),
-}  # fmt: skip
+}
 
 
 @pytest.mark.parametrize(("parameter", "said"), UNITS.values(), ids=UNITS)

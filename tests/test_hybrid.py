@@ -415,7 +415,7 @@ def test_a_period_depends_on_parameters_only(cls):
 
 def test_a_period_must_be_positive():
     """A period of 0 would never let time pass."""
-    with pytest.raises(SimulationError, match=r"part\.tick: its period must be above 0"):
+    with pytest.raises(InputError, match=r"part\.tick: its period is 0 s; it must be above 0"):
         alone(Ticker, dt="0 s").simulate(1.0)
 
 

@@ -48,9 +48,6 @@ class Hybrid:
         self.rising = [k for k, e in enumerate(system.events) if e.kind != "every"]
         self.ticking = [k for k, e in enumerate(system.events) if e.kind == "every"]
         self.periods = np.array(system.period(values.p)).ravel() if self.ticking else np.zeros(0)
-        if np.any(~(self.periods > 0)):
-            bad = system.events[self.ticking[int(np.argmin(self.periods > 0))]].name
-            raise SimulationError(f"{bad}: its period must be above 0")
         self.ticked = np.zeros(len(self.ticking), dtype=int)
         self.remap = Evaluator(system.remap, values.p) if system.events else None
         self.recent: dict[str, deque[float]] = {}
