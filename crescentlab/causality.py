@@ -336,8 +336,11 @@ def _order(graph: Graph, traces: dict[str, Trace], sources: dict[str, tuple[Sour
 
 def _loop(graph: Graph, traces: dict[str, Trace], after: dict[Step, set[Step]]) -> CausalityError:
     """The algebraic loop among the steps that never became ready, named port by port."""
-    digraph = nx.DiGraph((before, step) for step, need in after.items() for before in need if before in after)
-    cycle = [edge[0] for edge in nx.find_cycle(digraph)]
+    rank = {step: k for k, step in enumerate(after)}
+    edges = [(rank[before], rank[step]) for step, need in after.items() for before in need if before in rank]
+    found = [edge[0] for edge in nx.find_cycle(nx.DiGraph(sorted(edges)))]
+    first = found.index(min(found))
+    cycle = [list(after)[k] for k in found[first:] + found[:first]]
     names: list[str] = []
     for step in cycle:
         layout = traces[step.instance].outputs

@@ -58,7 +58,7 @@ class Quantity:
         said = f"{text!r}: " if text else ""
         if not key:
             raise UnitError(f"{said}{self.titled} needs a unit; write for example {self.example(text)}")
-        others = [q.title for q in QUANTITIES.values() if key in q.units]
+        others = [q.title for q in QUANTITIES.values() if key in q.units and q is not pressure_difference]
         if others:
             raise UnitError(
                 f"{said}{unit!r} is a unit of {' and '.join(others[:3])}, not of {self.title}; "
