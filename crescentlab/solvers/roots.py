@@ -61,7 +61,13 @@ class RootFinder:
         if self.waves.size or np.count_nonzero(suspects) or np.count_nonzero(turning):
             path = interpolant()
             places = np.union1d(np.flatnonzero(suspects | turning), self.waves)
-            found = [r for k in places if (r := self.course(int(k), path).first_root(low, high)) is not None]
+            plain = suspects & (self.before > band) & (self.slope < 0) & (slope < 0)
+            plain[self.waves] = False
+            found = []
+            for k in places.tolist():
+                course = self.course(k, path)
+                root = course.close(low, high, low, high) if plain[k] else course.first_root(low, high)
+                found += [root] if root is not None else []
             if found:
                 return min(found)
         self.before, self.slope = after, slope
@@ -79,7 +85,7 @@ class RootFinder:
 
     def course(self, k: int, path: Interpolant) -> _Course:
         """The k-th watched relation along ``path``."""
-        return _Course(self.hybrid, int(self.watched[k]), float(self.side[k]), path)
+        return _Course(self.hybrid, k, int(self.watched[k]), float(self.side[k]), path)
 
 
 PERIODIC = (ca.OP_SIN, ca.OP_COS, ca.OP_TAN, ca.OP_FMOD)
@@ -106,20 +112,21 @@ def waves(system: System) -> list[int]:
 class _Course:
     """One relation along the interpolant of a step: its distance from turning, negative once it should."""
 
-    def __init__(self, hybrid: Hybrid, place: int, side: float, path: Interpolant) -> None:
-        self.hybrid, self.place, self.side, self.path = hybrid, place, side, path
+    def __init__(self, hybrid: Hybrid, row: int, place: int, side: float, path: Interpolant) -> None:
+        """``row`` counts among the watched relations, ``place`` among all."""
+        self.hybrid, self.row, self.place, self.side, self.path = hybrid, row, place, side, path
         self.tolerance = hybrid.time_tolerance
         self.nothing = np.zeros(hybrid.system.x.numel())
 
     def value(self, t: float) -> float:
         """The distance, plus roundoff."""
-        g, _, scale = self.hybrid.relation(t, self.path(t), self.nothing)
-        return float(self.side * g[self.place] + 16 * EPS * scale[self.place])
+        g, _, scale = self.hybrid.watch(t, self.path(t), self.nothing)
+        return float(self.side * g[self.row] + 16 * EPS * scale[self.row])
 
     def both(self, t: float) -> tuple[float, float]:
         """The distance, plus roundoff, and its rate."""
-        g, rate, scale = self.hybrid.relation(t, self.path(t))
-        k = self.place
+        x, k = self.path(t), self.row
+        g, rate, scale = self.hybrid.watch(t, x, self.hybrid.f(t, x, self.hybrid.h, self.hybrid.b)[0])
         return float(self.side * g[k] + 16 * EPS * scale[k]), float(self.side * rate[k])
 
     def slope(self, t: float) -> float:

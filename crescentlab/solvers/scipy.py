@@ -170,6 +170,8 @@ class Stepper:
 
     def rate(self) -> np.ndarray:
         """dx/dt at the end of the last step."""
+        if hasattr(self.solver, "f"):
+            return self.outer(self.solver.f)
         return self.functions.f(self.t, self.x, self.functions.h, self.functions.b)[0]
 
     def path(self) -> Path:
