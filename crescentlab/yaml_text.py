@@ -135,7 +135,8 @@ def _explained(error: yaml.MarkedYAMLError, lines: list[str]) -> tuple[str, int]
     if "expected ':'" in problem:
         if glued := re.match(r"\s*([\w.]+):(\S.*)", first):
             return f"a blank is missing after the colon; write: {glued[1]}: {_cut(glued[2])}", begun
-        return f"a colon is missing; write: {_cut(first)}:", begun
+        word = first.strip().isidentifier()
+        return f"a colon is missing{'; write' if word else ' in'}: {_cut(first)}{':' * word}", begun
     if "mapping values" in problem:
         return (
             f"a colon where none can stand; quote text that holds one, and look at the indentation of: {_cut(shown)}",
