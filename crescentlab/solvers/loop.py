@@ -12,9 +12,9 @@ import numpy as np
 from scipy import sparse
 
 from crescentlab import units
-from crescentlab.domain import HYDRAULIC
 from crescentlab.errors import SimulationError
 from crescentlab.solvers.hybrid import Hybrid
+from crescentlab.solvers.limits import PressureLimits
 from crescentlab.solvers.roots import RootFinder
 from crescentlab.solvers.scipy import Functions, Stepper, stepper
 from crescentlab.solvers.trajectory import Happening, Pieces, Recording, Statistics, Trajectory
@@ -70,7 +70,7 @@ class _Run:
         self.happenings: list[Happening] = []
         self.warnings: list[str] = []
         self.angles = [k for k, q in enumerate(system.state_quantities) if q is units.angle]
-        self.limits = _PressureLimits(system)
+        self.limits = PressureLimits(system)
         self.rate = np.zeros(self.functions.n)
         """dx/dt at the end of the last step."""
         self.step_cap = min(options.max_step or np.inf, (options.stop - options.start) / 50)
@@ -376,63 +376,3 @@ class _Run:
             else "unknown"
         )
         return f"{name} limits it; try --solver bdf, a larger volume or mass there, or smoother signals"
-
-
-class _PressureLimits:
-    """Pressures below absolute zero end a run, or warn where the fluid may be under tension."""
-
-    def __init__(self, system: System) -> None:
-        self.system = system
-        self.states = self.of(system.state_names, system.state_quantities)
-        self.held = self.of(system.held_names, system.held_quantities)
-        self.seen_h: np.ndarray | None = None
-
-    def of(
-        self, names: list[str], quantities: list[units.Quantity]
-    ) -> tuple[np.ndarray, np.ndarray, list[str], list[bool]]:
-        """Places, lowest possible values, names, and whether tension is allowed, of all fluid pressures."""
-        plan = self.system.plan
-        found = []
-        for k, (name, quantity) in enumerate(zip(names, quantities, strict=True)):
-            owner = name.rpartition(".")[0]
-            hydraulic = any(p.domain is HYDRAULIC for p in type(plan.components[owner]).ports())
-            if quantity is units.pressure and hydraulic and plan.fluids[owner]:
-                fluid = plan.design.fluids[plan.fluids[owner][0]]
-                found.append((k, -fluid.atmospheric_pressure * (1 + 1e-9), name, fluid.tension))
-        places, floors, shown, tension = zip(*found, strict=True) if found else ((), (), (), ())
-        lowest = np.full(len(names), -np.inf)
-        lowest[list(places)] = floors
-        return np.array(places, dtype=int), lowest, list(shown), list(tension)
-
-    def check(self, t: float, x: np.ndarray, h: np.ndarray) -> str | None:
-        """A warning, or an error raised; None if all pressures are possible."""
-        warning = self.look(t, x, *self.states)
-        if h is not self.seen_h:
-            self.seen_h = h
-            warning = warning or self.look(t, h, *self.held)
-        return warning
-
-    def look(
-        self,
-        t: float,
-        vector: np.ndarray,
-        places: np.ndarray,
-        floors: np.ndarray,
-        names: list[str],
-        tension: list[bool],
-    ) -> str | None:
-        if not np.count_nonzero(vector < floors):
-            return None
-        k = int(np.flatnonzero(vector[places] < floors[places])[0])
-        said = (
-            f"{names[k]} is {units.pressure.show(vector[places][k], 'bar')} gauge at {t:.6g} s, below absolute zero "
-            f"({units.pressure.show(floors[places[k]], 'bar')})"
-        )
-        if not tension[k]:
-            raise SimulationError(
-                f"{said}; the oil would cavitate: feed this volume better, or write tension: true in the fluid to go on"
-            )
-        return said
-
-
-__all__ = ["Options", "integrate"]
