@@ -221,6 +221,8 @@ def _check_class(cls: type[Component]) -> None:
     where = f"component {cls.__name__}"
     ports = cls.ports()
     taken: dict[str, str] = {name: f"parameter {name}" for name in cls.model_fields}
+    for name in (RESERVED | {"type", "start"}) & set(cls.model_fields):
+        raise ComponentError(f"{where}: a parameter may not be called {name!r}, which has a meaning of its own")
     for port in ports:
         if port.role == "undecided" and not cls.family:
             raise ComponentError(

@@ -42,7 +42,7 @@ class InputError(CrescentlabError):
 
     def __init__(self, message: str, place: Place | None = None) -> None:
         super().__init__(message)
-        self.message = message
+        self.message = message.replace("\n", " ")
         self.place = place
 
     def at(self, place: Place | None) -> InputError:

@@ -204,6 +204,10 @@ IMPORTS = {
         f"{HEAD}class Mine(Component):\n    port = takes_pressure('x')\n",
         "has no equations; write `def equations(self, ...)",
     ),
+    "a parameter called start": (
+        mine("return {}", "start: Length = 0.0"),
+        "a parameter may not be called 'start', which has a meaning of its own",
+    ),
     "one name twice": (mine("return {}", "p_port = state(Pressure, 'x')"), "are both called 'p_port'; rename one"),
     "a class that exists": (
         mine("return {}", name="Capacity"),
