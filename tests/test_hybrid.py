@@ -1094,3 +1094,40 @@ def test_sampled_controller_against_its_z_transform(solver):
         assert result["plant.x"][after] == pytest.approx(x, abs=1e-6)
         assert result["control.output"][after] == pytest.approx(u, abs=1e-5)
     assert k == 100
+
+
+class Spoiled(Component):
+    """A held value that an event makes infinite."""
+
+    x = plain("x")
+    n = kept("value")
+
+    def equations(self, x, n):
+        return {"der_x": 1.0 + 0.0 * n, "spoils": when(x > 0.5, n=1 / (x - x))}
+
+
+class Explosion(Component):
+    """Growth beyond all numbers."""
+
+    calm = plain("bystander")
+    x = plain("what grows", 1.0)
+
+    def equations(self, x):
+        return {"der_calm": 1.0, "der_x": 2000 * x}
+
+
+def test_a_held_value_that_is_no_number_ends_the_run():
+    """Never silently: the message names the value and the event."""
+    result = alone(Spoiled).simulate(1.0, check=False)
+    assert result.trajectory.status == "failed"
+    assert "part.n was set to what is not a finite number by part.spoils" in result.trajectory.error
+    assert result.time[-1] == pytest.approx(0.5, abs=1e-9)
+
+
+@pytest.mark.parametrize("solver", ["lsoda", "bdf", "rk45"])
+def test_growth_beyond_all_numbers_names_the_state(solver):
+    """exp(2000 t) leaves the floating-point numbers at 0.35 s; no warning, the state is named, the run is kept."""
+    result = alone(Explosion).simulate(1.0, solver=solver, rtol=1e-4, check=False)
+    assert result.trajectory.status == "failed"
+    assert "part.x" in result.trajectory.error
+    assert 0.1 < result.time[-1] < 0.36

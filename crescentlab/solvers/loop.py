@@ -102,7 +102,8 @@ class _Run:
         begun = time.perf_counter()
         status, error = "done", ""
         try:
-            self.loop()
+            with np.errstate(all="ignore"):  # what is not finite is told by name, not by a warning
+                self.loop()
             if self.hybrid.finished:
                 status = "stopped"
         except SimulationError as problem:
@@ -258,6 +259,12 @@ class _Run:
             return x, True
         jumped = x_after is not x and not np.array_equal(x_after, x)
         self.check_finite(t, x_after, x_after, "after an event")
+        wrong = np.flatnonzero(~np.isfinite(hybrid.h))
+        if wrong.size:
+            name = self.system.held_names[int(wrong[0])]
+            raise SimulationError(
+                f"{name} was set to what is not a finite number by {', '.join(names)} (t = {t:.6g} s)"
+            )
         self.record(t, x_after, jump=True)
         return x_after, not jumped and self.goes_on(t, x_after)
 
@@ -370,9 +377,7 @@ class _Run:
             (self.functions.nonzeros(t, x), pattern.indices, pattern.indptr), shape=pattern.shape
         )
         change = np.abs(matrix @ f) / (self.atol + self.options.rtol * np.abs(x))
-        name = (
-            self.system.state_names[int(np.nanargmax(change))]
-            if change.size and np.isfinite(change).any()
-            else "unknown"
-        )
+        if not np.isfinite(change).all():  # it has grown beyond all bounds: the largest state is to blame
+            change = np.abs(x) / self.system.nominal
+        name = self.system.state_names[int(np.argmax(change))]
         return f"{name} limits it; try --solver bdf, a larger volume or mass there, or smoother signals"
