@@ -50,6 +50,7 @@ class _Assembly:
         self.outputs: dict[str, list[ca.SX]] = {name: [ca.SX(0)] * tr.outputs.size for name, tr in traces.items()}
         self.inputs: dict[str, ca.SX] = {}
         self.observed: dict[str, ca.SX] = {}
+        self.known: dict[str, Variable] | None = None
         self.resolved: set[str] = set()
         self.running: list[str] = []
         self.pending: dict[str, Output] = {}
@@ -251,9 +252,14 @@ class _Assembly:
 
     # -- variables -------------------------------------------------------------------------------
 
-    @functools.cache  # noqa: B019 - an assembly lives as long as its system
     def variables(self) -> dict[str, Variable]:
-        """Every name a result knows."""
+        """Every name a result knows, found once."""
+        if self.known is None:
+            self.known = self.find_variables()
+        return self.known
+
+    def find_variables(self) -> dict[str, Variable]:
+        """States, held values, observables, port variables, nets and outputs."""
         found: dict[str, Variable] = {}
         for (name, component), xs, hs in zip(self.plan.components.items(), self.xs, self.hs, strict=True):
             trace = self.plan.traces[name]
