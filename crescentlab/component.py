@@ -209,12 +209,12 @@ def fluid_names(cls: type[Component]) -> list[str]:
     return ["fluid"] + [f"fluid_{p.name}" for p in cls.ports() if p.domain is HYDRAULIC]
 
 
-def returns(cls: type[Component]) -> tuple[set[str], set[str]]:
-    """Names ``equations`` must return, and those it may return besides events."""
+def returns(cls: type[Component]) -> set[str]:
+    """Names ``equations`` must return; whatever else it returns is an event."""
     must = {name for port in cls.ports() for name, _ in port.outputs()}
     must |= {f"der_{s.name}" for s in cls.declared(State)}
     must |= {o.name for o in cls.declared(Observable)}
-    return must, must
+    return must
 
 
 def _check_class(cls: type[Component]) -> None:
@@ -261,7 +261,7 @@ def check_returned(cls: type[Component], returned: Any) -> None:
     where = f"component {cls.__name__}"
     if not isinstance(returned, dict):
         raise ComponentError(f"{where}: equations must return a dictionary, not {type(returned).__name__}")
-    must, _ = returns(cls)
+    must = returns(cls)
     missing = must - returned.keys()
     if missing:
         raise ComponentError(f"{where}: equations does not return {', '.join(sorted(missing))}")

@@ -92,22 +92,6 @@ def number_of(value: Value, quantity: Quantity) -> float:
     return float(value.value)
 
 
-def names_in(text: str) -> set[str]:
-    """Names an expression refers to (dotted, without indices)."""
-    tree, literals = _parse(text.removeprefix("=").strip())
-    found: set[str] = set()
-    functions = {id(node.func) for node in ast.walk(tree) if isinstance(node, ast.Call)}
-    inner: set[int] = set()
-    for node in ast.walk(tree):
-        if isinstance(node, (ast.Name, ast.Attribute)) and id(node) not in functions and id(node) not in inner:
-            name = _dotted(node)
-            if isinstance(node, ast.Attribute):
-                inner |= {id(n) for n in ast.walk(node)}
-            if name and name not in literals and name != "pi":
-                found.add(name)
-    return found
-
-
 @cache
 def _literal_pattern() -> re.Pattern[str]:
     units = {u for q in QUANTITIES.values() for u in q.units if u and u[0].isalpha()} | {"°", "°/s"}

@@ -19,7 +19,7 @@ import numpy as np
 
 from crescentlab import __version__
 from crescentlab.errors import InputError, nearest
-from crescentlab.units import DISPLAY, QUANTITIES, Quantity
+from crescentlab.units import DISPLAY, Quantity
 
 if TYPE_CHECKING:
     import pandas
@@ -319,8 +319,3 @@ def _read_netcdf(path: Path) -> tuple[np.ndarray, dict[str, np.ndarray], dict[st
         units = {n: str(v.attrs.get("units", "")) for n, v in file.items()}
         attributes = {k: v.item() if hasattr(v, "item") else v for k, v in file.attrs.items() if k[0] != "_"}
     return series.pop("time"), series, units, attributes
-
-
-def quantity_of_unit(unit: str) -> Quantity | None:
-    """The quantity whose SI unit this is."""
-    return next((q for q in QUANTITIES.values() if q.si == unit), None)

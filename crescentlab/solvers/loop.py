@@ -69,6 +69,7 @@ class _Run:
         self.pieces = Pieces()
         self.happenings: list[Happening] = []
         self.warnings: list[str] = []
+        self.ticks = {event.name for event in system.events if event.kind == "every"}
         self.angles = [k for k, q in enumerate(system.state_quantities) if q is units.angle]
         self.limits = PressureLimits(system)
         self.rate = np.zeros(self.functions.n)
@@ -119,16 +120,9 @@ class _Run:
             self.grid.add(self.steps.t[0], self.steps.x[0], self.steps.h[0], self.steps.b[0])
         layout = "" if not self.functions.n else f" ({self.stepper.name})"
         return Trajectory(
-            self.steps,
-            self.grid,
-            self.happenings,
-            s,
-            self.options.solver + layout,
-            self.pieces,
-            status,
-            error,
-            self.warnings,
-        )
+            steps=self.steps, grid=self.grid, happenings=self.happenings, statistics=s,
+            solver=self.options.solver + layout, pieces=self.pieces, status=status, error=error, warnings=self.warnings,
+        )  # fmt: skip
 
     def now(self) -> float:
         return self.steps.t[-1] if self.steps.t else self.options.start
@@ -139,8 +133,7 @@ class _Run:
     def loop(self) -> None:
         o, hybrid = self.options, self.hybrid
         t, x = o.start, self.values.x0.copy()
-        if not np.all(np.isfinite(self.functions.rhs(t, x))):
-            self.check_finite(t, x, self.functions.rhs(t, x), "at the start")
+        self.check_finite(t, x, self.functions.rhs(t, x), "at the start")
         hybrid.begin(t, x)
         self.sync()
         x, names = hybrid.stop(t, x, [])
@@ -183,7 +176,7 @@ class _Run:
             if event is not None:
                 return self.inside(event, high, x_high, goal)
             if high >= goal - self.hybrid.time_tolerance:
-                return self.reached(high, x_high, goal)
+                return self.at_goal(goal, x_high)
             self.record(high, x_high)
             t = high
             self.report(t)
@@ -286,8 +279,7 @@ class _Run:
     def booked(self, t: float, names: list[str]) -> None:
         if not names:
             return
-        ticks = {e.name for e in self.system.events if e.kind == "every"} if self.hybrid.ticking else set()
-        events = [n for n in names if n not in ticks]
+        events = [n for n in names if n not in self.ticks]
         self.statistics.ticks += len(names) - len(events)
         self.statistics.events += len(events)
         self.happenings.append(Happening(t, tuple(names)))
