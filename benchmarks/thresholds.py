@@ -16,7 +16,8 @@ from collections.abc import Iterator
 from crescentlab.circuit import Circuit
 from crescentlab.netlist import Netlist
 from crescentlab.solvers import scipy as steppers
-from crescentlab.solvers.loop import Options, integrate
+from crescentlab.solvers.integrate import integrate
+from crescentlab.solvers.options import Options
 
 LAYOUTS = {"lsoda full": ("lsoda", "dense"), "lsoda banded": ("lsoda", "banded"), "bdf sparse": ("bdf", "sparse")}
 

@@ -230,8 +230,11 @@ class _Assembly:
         held = _depends(g, ca.vertcat(self.h, b)) if n else np.zeros(0, bool)
         return Bits(tuple(names), np.array(strict, bool), on_state, timed, timed & ~curved, held)
 
-    def remap(self) -> tuple[ca.SX, list[ca.SX]]:
-        """Flags of fired events, and the states and held values after them; composed in the order written."""
+    def remap(self, may_fire: list[bool]) -> tuple[ca.SX, list[ca.SX]]:
+        """Flags of fired events, and the states and held values after them; composed in the order written.
+
+        Events that cannot fire are left out.
+        """
         total = sum(len(tr.events) for tr in self.plan.traces.values()) + (1 if hasattr(self, "stop_strict") else 0)
         fired = ca.SX.sym("fired", total)
         new_x: list[ca.SX] = []
@@ -241,7 +244,7 @@ class _Assembly:
             xs, hs, bs, ps, pf = self.arguments[name]
             nx = trace.states.size
             for event in trace.events:
-                if event.remap is not None:
+                if event.remap is not None and may_fire[at]:
                     after = event.remap(self.t, xs, hs, bs, self.inputs[name], ps, pf)
                     both = ca.if_else(fired[at], after, ca.vertcat(xs, hs))
                     xs, hs = ca.vertsplit(both, [0, nx, both.numel()])

@@ -39,7 +39,7 @@ def balance(system: System, values: Values, trajectory: Trajectory) -> Balance |
     """Compute the ledger; None if nothing stores or no step was made."""
     contents = system.contents()
     pieces = trajectory.pieces
-    if not contents or not pieces.low:
+    if not contents or not len(pieces.low):
         return None
     stored = ca.Function("S", system.arguments, [ca.vertcat(*[c for c, _, _ in contents.values()])])
     flows = ca.Function(
@@ -60,7 +60,7 @@ def balance(system: System, values: Values, trajectory: Trajectory) -> Balance |
         size += weight * np.array(m) * (high - low)
     t, xs, hs, bs = trajectory.steps.arrays()
     content = np.array(stored(t.reshape(1, -1), xs.T, hs.T, bs.T, values.p))
-    jumps = np.array(trajectory.steps.jumps, dtype=int)
+    jumps = trajectory.steps.jumps
     moved = content[:, jumps] - content[:, jumps - 1] if jumps.size else np.zeros((len(contents), 0))
     change = content[:, -1] - content[:, 0] - moved.sum(axis=1)
     largest = max(float(size.sum(axis=1).max()), 1e-300)

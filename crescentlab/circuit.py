@@ -24,7 +24,8 @@ from crescentlab.library import Library, installed
 from crescentlab.netlist import SMALLEST_RTOL, Netlist, SimulationSection
 from crescentlab.plotting import check_plots
 from crescentlab.result import Result
-from crescentlab.solvers.loop import Options, integrate
+from crescentlab.solvers.integrate import integrate
+from crescentlab.solvers.options import Options
 from crescentlab.system import System
 from crescentlab.trace import structure_of
 from crescentlab.units import QUANTITIES

@@ -75,6 +75,10 @@ class SimulationError(CrescentlabError):
     """The integration cannot go on; what was computed so far is kept by the caller."""
 
 
+class CompilerError(CrescentlabError):
+    """Nothing can be compiled on this machine; what needs no compiler goes on."""
+
+
 def nearest(name: str, known: Iterable[str], *, limit: int = 3, otherwise: str = "") -> str:
     """The sentence that offers names like the one received, or says ``otherwise``, or lists what exists."""
     names = sorted(set(known))

@@ -10,7 +10,7 @@ remaps are CasADi functions; every other variable is an expression, made a funct
 from __future__ import annotations
 
 import functools
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -22,7 +22,7 @@ from crescentlab.component import Component
 from crescentlab.domain import Held, State
 from crescentlab.elaborate import Design
 from crescentlab.errors import InputError, nearest
-from crescentlab.prepared import Prepared, prepare
+from crescentlab.prepared import Prepared, compiled, prepare
 from crescentlab.trace import numeric_fields, structure_of
 from crescentlab.units import Quantity
 
@@ -101,9 +101,11 @@ class System:
     held_quantities: list[Quantity]
     bits: Bits
     _variables: Callable[[], dict[str, Variable]]
-    _remap: Callable[[], tuple[ca.SX, list[ca.SX]]]
+    _remap: Callable[[list[bool]], tuple[ca.SX, list[ca.SX]]]
     _contents: dict[str, tuple[Callable[[], ca.SX], Callable[[], tuple[ca.SX, ca.SX]]]]
     _functions: dict[Any, ca.Function] = field(default_factory=dict)
+    in_c: set[str] = field(default_factory=set)
+    """Names of the functions that have been compiled."""
 
     @property
     def arguments(self) -> list[ca.SX]:
@@ -131,6 +133,12 @@ class System:
         return prepare("dfdx", self.arguments[:-1], self.p, [self.jacobian_expression.nz[:]])
 
     @functools.cached_property
+    def linear(self) -> Prepared:
+        """f, the nonzeros of df/dx in column order, and df/dt, together: they share most of their parts."""
+        outputs = [self.f, self.jacobian_expression.nz[:], ca.densify(ca.jacobian(self.f, self.t))]
+        return prepare("linear", self.arguments[:-1], self.p, outputs)
+
+    @functools.cached_property
     def relation(self) -> Prepared:
         """(t, x, h, b, dx/dt) -> relations g, their time derivatives, and the magnitude of their sides."""
         return self._relations(list(range(self.relations.numel())))
@@ -153,8 +161,30 @@ class System:
     @functools.cached_property
     def remap(self) -> Prepared:
         """(t, x, h, b, fired) -> new (x, h)."""
-        fired, outputs = self._remap()
+        return self._remapped([True] * len(self.events))
+
+    @functools.cached_property
+    def remap_ticks(self) -> Prepared:
+        """:attr:`remap` when nothing but ticks fires."""
+        return self._remapped([event.kind == "every" for event in self.events])
+
+    @functools.cached_property
+    def remap_events(self) -> Prepared:
+        """:attr:`remap` when no tick fires."""
+        return self._remapped([event.kind != "every" for event in self.events])
+
+    def _remapped(self, may_fire: list[bool]) -> Prepared:
+        fired, outputs = self._remap(may_fire)
         return prepare("remap", [*self.arguments[:-1], fired], self.p, outputs)
+
+    def compile(self, names: Iterable[str]) -> None:
+        """Let the functions of these names be C from now on, whoever calls them: the same numbers, sooner.
+
+        Raises :class:`CompilerError` on a machine that cannot, and leaves them as they are.
+        """
+        left = {name: getattr(self, name) for name in names if name not in self.in_c}
+        vars(self).update(compiled(left))
+        self.in_c.update(left)
 
     @functools.cached_property
     def period(self) -> ca.Function:

@@ -14,7 +14,8 @@ from crescentlab.component import Component
 from crescentlab.domain import gives_signal, held, observable, state, takes_signal
 from crescentlab.errors import InputError, SimulationError
 from crescentlab.maths import cos, event_where, every, exp, fail_when, not_, pi, sin, stack, when, where
-from crescentlab.solvers.loop import Options, integrate
+from crescentlab.solvers.integrate import integrate
+from crescentlab.solvers.options import Options
 from crescentlab.units import Angle, Ratio, Time
 
 

@@ -15,8 +15,10 @@ from crescentlab.component import Component
 from crescentlab.domain import held, state
 from crescentlab.maths import cos, sin, stack, total, when, where
 from crescentlab.solvers import scipy as steppers
-from crescentlab.solvers.loop import Options, integrate
-from crescentlab.solvers.scipy import Functions, banded, choose, stepper
+from crescentlab.solvers.functions import Functions
+from crescentlab.solvers.integrate import integrate
+from crescentlab.solvers.options import Options
+from crescentlab.solvers.scipy import banded, choose, stepper
 from crescentlab.units import Flow, Pressure, Ratio
 
 SOLVERS = ["auto", "lsoda", "bdf", "radau", "rk45", "dop853"]

@@ -99,7 +99,7 @@ def report(result: Result, target: Path | None) -> dict[str, Any]:
     t, balance = result.trajectory, result.balance
     s = t.statistics
     return {
-        "status": t.status, "final_time": t.steps.t[-1], "wall_s": s.wall_s, "steps": s.steps,
+        "status": t.status, "final_time": float(t.steps.t[-1]), "wall_s": s.wall_s, "steps": s.steps,
         "evaluations": s.evaluations, "jacobians": s.jacobians, "events": s.events, "ticks": s.ticks,
         "restarts": s.restarts, "states": len(result.system.state_names),
         "balance": balance.as_json() if balance else None, "warnings": list(t.warnings),
@@ -133,7 +133,7 @@ def _facts(result: Result) -> list[tuple[str, str]]:
     """What the run took."""
     t, s = result.trajectory, result.trajectory.statistics
     time, states = QUANTITIES["time"], len(result.system.state_names)
-    end = time.show(t.steps.t[-1], result.display_unit(time))
+    end = time.show(float(t.steps.t[-1]), result.display_unit(time))
     work = f"{counted(s.steps, 'step')}, {counted(s.evaluations, 'evaluation')}, {counted(s.jacobians, 'Jacobian')}"
     rows = [
         ("end", end if t.status == "done" else f"{end}, {t.status}"),

@@ -9,6 +9,7 @@ just before the round, and the bits settle again.
 from __future__ import annotations
 
 from collections import deque
+from typing import NoReturn
 
 import numpy as np
 
@@ -102,10 +103,7 @@ class Hybrid:
                 return
             key = new.tobytes()
             if key in seen:
-                changing = self.bits_info.names[int(np.flatnonzero(new != self.b)[0])]
-                raise SimulationError(
-                    f"both sides push towards the boundary of {changing}; the component needs a mode that rests on it"
-                )
+                self.raise_unsettled(self.bits_info.names[int(np.flatnonzero(new != self.b)[0])])
             seen[key] = 1
             self.b = new
             self.rescan()
@@ -135,7 +133,7 @@ class Hybrid:
                 self.rescan()
             self.settle(t, x)
             self.finished = self.finished or any(self.system.events[k].kind == "stop" for k in fired)
-        raise SimulationError(f"events keep causing each other at one instant: {', '.join(dict.fromkeys(names[-6:]))}")
+        self.raise_endless(list(dict.fromkeys(names[-6:])))
 
     def edges(self, t: float, x: np.ndarray) -> list[int]:
         """Events whose conditions have just turned true."""
@@ -161,16 +159,30 @@ class Hybrid:
                 }
                 raise SimulationError(event.message.format(**shown))
 
+    def raise_unsettled(self, relation: str) -> NoReturn:
+        """Both values of a relation's bit contradict it."""
+        raise SimulationError(
+            f"both sides push towards the boundary of {relation}; the component needs a mode that rests on it"
+        )
+
+    def raise_endless(self, names: list[str]) -> NoReturn:
+        """The rounds of one instant do not end."""
+        raise SimulationError(f"events keep causing each other at one instant: {', '.join(names)}")
+
+    def raise_zeno(self, name: str, within: float) -> NoReturn:
+        """An event fires ever sooner."""
+        raise SimulationError(
+            f"{name} happens faster and faster ({ZENO_COUNT} times within {within:.2g} s); "
+            "the part needs a mode in which it rests (for a mass with stops, a larger rest_speed)"
+        )
+
     def note(self, t: float, names: list[str]) -> None:
         """Watch for events that pile up towards an instant (Zeno)."""
         for name in names:
             times = self.recent.setdefault(name, deque(maxlen=ZENO_COUNT))
             times.append(t)
             if len(times) == ZENO_COUNT and t - times[0] < ZENO_SPAN * self.span:
-                raise SimulationError(
-                    f"{name} happens faster and faster ({ZENO_COUNT} times within {t - times[0]:.2g} s); "
-                    "the part needs a mode in which it rests (for a mass with stops, a larger rest_speed)"
-                )
+                self.raise_zeno(name, t - times[0])
 
     # -- what lies ahead -------------------------------------------------------------------------
 

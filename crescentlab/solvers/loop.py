@@ -5,44 +5,25 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Callable
-from dataclasses import dataclass
 
-import casadi as ca
 import numpy as np
-from scipy import sparse
 
 from crescentlab import units
 from crescentlab.errors import SimulationError
+from crescentlab.solvers.diagnosis import Diagnosis
+from crescentlab.solvers.functions import Functions
 from crescentlab.solvers.hybrid import Hybrid
 from crescentlab.solvers.limits import PressureLimits
+from crescentlab.solvers.options import ANGLE_STEP, RESTART_SHARE, Options
+from crescentlab.solvers.pace import CLOCK_SWING, clock_pace
 from crescentlab.solvers.roots import RootFinder
-from crescentlab.solvers.scipy import Functions, Stepper, stepper
-from crescentlab.solvers.trajectory import Happening, Pieces, Recording, Statistics, Trajectory
+from crescentlab.solvers.scipy import Stepper, stepper
+from crescentlab.solvers.trajectory import Happening, Paths, Recording, Statistics, Trajectory
 from crescentlab.system import System, Values
 
-ANGLE_STEP = 0.3
-"""A step turns no angle further than this [rad], so that what depends on it is not stepped over."""
 SMALLEST_STEP = 1e-14
 """Steps below this share of the span, many in a row, are a collapse."""
 COLLAPSE_COUNT = 500
-CLOCK_POINTS = 4097
-CLOCK_SWING = 0.5
-"""In one step no value that depends on time alone swings by more than this share of its range."""
-RESTART_SHARE = 1e-3
-"""A change of f that moves no state by more than this share of its tolerance over a step needs no restart; a sampled
-part makes thousands of such changes, and their sum must stay within the tolerance."""
-
-
-@dataclass(frozen=True)
-class Options:
-    """How to integrate; times in seconds."""
-
-    stop: float
-    start: float = 0.0
-    rtol: float = 1e-6
-    solver: str = "auto"
-    max_step: float | None = None
-    output_step: float | None = None
 
 
 def integrate(
@@ -61,12 +42,13 @@ class _Run:
         self.hybrid = Hybrid(system, values, options.start, options.stop)
         self.roots = RootFinder(self.hybrid)
         self.atol = options.rtol * system.nominal
+        self.diagnosis = Diagnosis(self.functions, options.rtol, self.atol)
         self.stepper: Stepper = stepper(options.solver, self.functions, options.rtol, self.atol)
         self.statistics = Statistics()
         self.steps = Recording()
         self.grid = Recording() if options.output_step else None
         self.grid_count = 0
-        self.pieces = Pieces()
+        self.pieces = Paths()
         self.happenings: list[Happening] = []
         self.warnings: list[str] = []
         self.ticks = {event.name for event in system.events if event.kind == "every"}
@@ -74,28 +56,10 @@ class _Run:
         self.limits = PressureLimits(system)
         self.rate = np.zeros(self.functions.n)
         """dx/dt at the end of the last step."""
-        self.step_cap = min(options.max_step or np.inf, (options.stop - options.start) / 50)
-        self.pace = self.clock_pace()
+        self.step_cap = options.step_cap
+        self.pace = clock_pace(system, values, options.start, options.stop)
         self.tiny = 0
         self.shown_at = 0.0
-
-    @property
-    def span(self) -> float:
-        return self.options.stop - self.options.start
-
-    def clock_pace(self) -> tuple[np.ndarray, np.ndarray] | None:
-        """Times, and how far values that depend on time alone have swung until then, in shares of their range."""
-        clock = self.system.clock
-        if not clock.numel():
-            return None
-        values = ca.Function("clock", self.system.arguments, [clock])
-        times = np.linspace(self.options.start, self.options.stop, CLOCK_POINTS)
-        v = self.values
-        with np.errstate(all="ignore"):
-            swing = np.array(values(times.reshape(1, -1), v.x0, v.h0, np.zeros(self.system.b.numel()), v.p))
-            shares = np.abs(np.diff(swing, axis=1)) / np.ptp(swing, axis=1, keepdims=True)
-        shares = shares[np.isfinite(shares).all(axis=1)]
-        return (times, np.concatenate(([0.0], np.cumsum(shares.max(axis=0))))) if shares.size else None
 
     # -- the run ---------------------------------------------------------------------------------
 
@@ -120,8 +84,9 @@ class _Run:
             self.grid.add(self.steps.t[0], self.steps.x[0], self.steps.h[0], self.steps.b[0])
         layout = "" if not self.functions.n else f" ({self.stepper.name})"
         return Trajectory(
-            steps=self.steps, grid=self.grid, happenings=self.happenings, statistics=s,
-            solver=self.options.solver + layout, pieces=self.pieces, status=status, error=error, warnings=self.warnings,
+            steps=self.steps.done(), grid=self.grid.done() if self.grid else None, happenings=self.happenings,
+            statistics=s, solver=self.options.solver + layout, pieces=self.pieces, status=status, error=error,
+            warnings=self.warnings,
         )  # fmt: skip
 
     def now(self) -> float:
@@ -133,7 +98,7 @@ class _Run:
     def loop(self) -> None:
         o, hybrid = self.options, self.hybrid
         t, x = o.start, self.values.x0.copy()
-        self.check_finite(t, x, self.functions.rhs(t, x), "at the start")
+        self.diagnosis.check_finite(t, x, self.functions.rhs(t, x), "at the start")
         hybrid.begin(t, x)
         self.sync()
         x, names = hybrid.stop(t, x, [])
@@ -151,7 +116,7 @@ class _Run:
     def started(self, t: float, x: np.ndarray) -> np.ndarray:
         """Restart the stepper at (t, x)."""
         rate = self.functions.rhs(t, x)
-        self.check_finite(t, x, rate, "")
+        self.diagnosis.check_finite(t, x, rate)
         self.stepper.restart(t, x, self.options.stop)
         self.roots.begin(t, x, rate)
         self.rate = rate
@@ -197,8 +162,8 @@ class _Run:
             self.stepper.step(bound)
         except SimulationError as problem:
             t, x = self.stepper.t, self.stepper.x
-            self.check_finite(t, x, self.functions.rhs(t, x), "")
-            raise SimulationError(f"no step is small enough ({problem}); {self.blame(t, x)}") from None
+            self.diagnosis.check_finite(t, x, self.functions.rhs(t, x))
+            raise SimulationError(f"no step is small enough ({problem}); {self.diagnosis.blame(t, x)}") from None
         self.statistics.steps += 1
 
     def inside(self, t: float, high: float, x_high: np.ndarray, goal: float) -> tuple[float, np.ndarray]:
@@ -251,13 +216,8 @@ class _Run:
         if not changed:
             return x, True
         jumped = x_after is not x and not np.array_equal(x_after, x)
-        self.check_finite(t, x_after, x_after, "after an event")
-        wrong = np.flatnonzero(~np.isfinite(hybrid.h))
-        if wrong.size:
-            name = self.system.held_names[int(wrong[0])]
-            raise SimulationError(
-                f"{name} was set to what is not a finite number by {', '.join(names)} (t = {t:.6g} s)"
-            )
+        self.diagnosis.check_finite(t, x_after, x_after, "after an event")
+        self.diagnosis.check_held(t, hybrid.h, names)
         self.record(t, x_after, jump=True)
         return x_after, not jumped and self.goes_on(t, x_after)
 
@@ -316,17 +276,17 @@ class _Run:
     def report(self, t: float) -> None:
         if self.progress is not None and (now := time.perf_counter()) - self.shown_at > 0.1:
             self.shown_at = now
-            self.progress((t - self.options.start) / self.span)
+            self.progress((t - self.options.start) / self.options.span)
 
     # -- checks ----------------------------------------------------------------------------------
 
     def check_step(self, low: float, high: float, x: np.ndarray) -> None:
         if not math.isfinite(x @ x):
-            self.check_finite(high, x, x, "")
-        if high - low < SMALLEST_STEP * self.span:
+            self.diagnosis.check_finite(high, x, x)
+        if high - low < SMALLEST_STEP * self.options.span:
             self.tiny += 1
             if self.tiny > COLLAPSE_COUNT:
-                raise SimulationError(f"the step size collapsed to {high - low:.2g} s; {self.blame(high, x)}")
+                raise SimulationError(f"the step size collapsed to {high - low:.2g} s; {self.diagnosis.blame(high, x)}")
         else:
             self.tiny = 0
         try:
@@ -350,26 +310,3 @@ class _Run:
                 b = middle
         self.fill(low, a)
         self.record(a, np.array(path(a)))
-
-    def check_finite(self, t: float, x: np.ndarray, values: np.ndarray, when: str) -> None:
-        bad = np.flatnonzero(~np.isfinite(values))
-        if bad.size:
-            name = self.system.state_names[int(bad[0])]
-            what = "is no longer a finite number" if values is x else "has a rate that is not a finite number"
-            raise SimulationError(
-                f"{name} {what} {when + ' ' if when else ''}(t = {t:.6g} s); "
-                f"look at the parameters of {name.rpartition('.')[0]} and at the start values"
-            )
-
-    def blame(self, t: float, x: np.ndarray) -> str:
-        """The state whose rate changes fastest against its tolerance."""
-        f = self.functions.rhs(t, x)
-        pattern = self.functions.pattern
-        matrix = sparse.csc_matrix(
-            (self.functions.nonzeros(t, x), pattern.indices, pattern.indptr), shape=pattern.shape
-        )
-        change = np.abs(matrix @ f) / (self.atol + self.options.rtol * np.abs(x))
-        if not np.isfinite(change).all():  # it has grown beyond all bounds: the largest state is to blame
-            change = np.abs(x) / self.system.nominal
-        name = self.system.state_names[int(np.argmax(change))]
-        return f"{name} limits it; try --solver bdf, a larger volume or mass there, or smoother signals"

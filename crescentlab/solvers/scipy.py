@@ -14,8 +14,7 @@ from scipy import integrate, sparse
 from scipy.sparse.csgraph import reverse_cuthill_mckee
 
 from crescentlab.errors import SimulationError
-from crescentlab.prepared import Evaluator
-from crescentlab.system import System, Values
+from crescentlab.solvers.functions import Functions
 
 SMALL = 25
 """Up to this many states LSODA with a full matrix is quickest (benchmarks/thresholds.py)."""
@@ -38,39 +37,6 @@ METHODS: dict[str, Any] = {
 
 Path = Callable[[np.ndarray], np.ndarray]
 """States at times, shape (times, n)."""
-
-
-class Functions:
-    """f and its Jacobian of one run, with the current held values and bits."""
-
-    def __init__(self, system: System, values: Values) -> None:
-        self.n = values.x0.size
-        self.f = Evaluator(system.rhs, values.p)
-        self.system, self.values = system, values
-        self._jacobian: Evaluator | None = None
-        self.h = values.h0
-        self.b = np.zeros(system.b.numel())
-        self.evaluations = 0
-        self.jacobians = 0
-
-    def rhs(self, t: float, x: np.ndarray) -> np.ndarray:
-        """f(t, x), shape (n,)."""
-        self.evaluations += 1
-        return self.f(t, x, self.h, self.b)[0].copy()
-
-    @property
-    def pattern(self) -> sparse.csc_matrix:
-        """Sparsity of the Jacobian."""
-        pattern = self.system.jacobian_expression.sparsity()
-        rows, start = np.array(pattern.row()), np.array(pattern.colind())
-        return sparse.csc_matrix((np.ones(rows.size), rows, start), shape=(self.n, self.n))
-
-    def nonzeros(self, t: float, x: np.ndarray) -> np.ndarray:
-        """Nonzeros of the Jacobian in column order."""
-        if self._jacobian is None:
-            self._jacobian = Evaluator(self.system.jacobian, self.values.p)
-        self.jacobians += 1
-        return self._jacobian(t, x, self.h, self.b)[0]
 
 
 class Stepper:

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
+from typing import Protocol
 
 import numpy as np
 
@@ -18,6 +19,8 @@ class Statistics:
     events: int = 0
     ticks: int = 0
     restarts: int = 0
+    rejected: int = 0
+    factorisations: int = 0
     wall_s: float = 0.0
 
 
@@ -29,6 +32,22 @@ class Happening:
     names: tuple[str, ...]
 
 
+@dataclass(frozen=True)
+class Rows:
+    """Rows of a run: times (m,), states (m, n), held values (m, k), bits (m, r)."""
+
+    t: np.ndarray
+    x: np.ndarray
+    h: np.ndarray
+    b: np.ndarray
+    jumps: np.ndarray
+    """Places of rows that repeat the time of the row before: the values after an event."""
+
+    def arrays(self) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+        """Times, states, held values, bits."""
+        return self.t, self.x, self.h, self.b
+
+
 @dataclass
 class Recording:
     """Rows of (t, x, h, b), grown during a run."""
@@ -38,7 +57,6 @@ class Recording:
     h: list[np.ndarray] = field(default_factory=list)
     b: list[np.ndarray] = field(default_factory=list)
     jumps: list[int] = field(default_factory=list)
-    """Rows that repeat the time of the row before: the values after an event."""
 
     def add(self, t: float, x: np.ndarray, h: np.ndarray, b: np.ndarray, *, jump: bool = False) -> None:
         """Append a row; the arrays must not be changed afterwards."""
@@ -49,9 +67,10 @@ class Recording:
         self.h.append(h)
         self.b.append(b)
 
-    def arrays(self) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-        """Times (m,), states (m, n), held values (m, k), bits (m, r)."""
-        return np.array(self.t), np.array(self.x), np.array(self.h), np.array(self.b)
+    def done(self) -> Rows:
+        """The rows as arrays."""
+        arrays = (np.array(rows) for rows in (self.t, self.x, self.h, self.b))
+        return Rows(*arrays, np.array(self.jumps, dtype=int))
 
 
 GAUSS_NODES = (np.array([-np.sqrt(0.6), 0.0, np.sqrt(0.6)]) + 1) / 2
@@ -59,9 +78,32 @@ GAUSS_WEIGHTS = np.array([5.0, 8.0, 5.0]) / 18
 """Three-point Gauss-Legendre rule on [0, 1]: integrals over steps are exact to their order."""
 
 
+class Pieces(Protocol):
+    """The smooth pieces of a run, for integrals over time."""
+
+    @property
+    def low(self) -> Sequence[float] | np.ndarray:
+        """Begin of each piece, shape (pieces,)."""
+
+    @property
+    def high(self) -> Sequence[float] | np.ndarray:
+        """End of each piece, shape (pieces,)."""
+
+    @property
+    def h(self) -> Sequence[np.ndarray] | np.ndarray:
+        """Held values in each piece, shape (pieces, k)."""
+
+    @property
+    def b(self) -> Sequence[np.ndarray] | np.ndarray:
+        """Bits in each piece, shape (pieces, r)."""
+
+    def at_nodes(self) -> np.ndarray:
+        """States at the Gauss nodes of every piece, shape (pieces, 3, n)."""
+
+
 @dataclass
-class Pieces:
-    """The smooth pieces of a run with the solver's own interpolants, for integrals over time."""
+class Paths:
+    """Pieces as the solver's own interpolants."""
 
     low: list[float] = field(default_factory=list)
     high: list[float] = field(default_factory=list)
@@ -89,23 +131,49 @@ class Pieces:
         )
 
 
+@dataclass(frozen=True)
+class Polynomials:
+    """Pieces as polynomials: x = sum over k of coefficients[k] ((t - low)/length)^k."""
+
+    low: np.ndarray
+    high: np.ndarray
+    length: np.ndarray
+    coefficients: np.ndarray
+    """Shape (pieces, degree + 1, n)."""
+    h: np.ndarray
+    b: np.ndarray
+
+    def at(self, pieces: np.ndarray, times: np.ndarray) -> np.ndarray:
+        """States at one time in each of the given pieces, shape (times, n)."""
+        theta = ((times - self.low[pieces]) / self.length[pieces])[:, None]
+        x = np.zeros((pieces.size, self.coefficients.shape[2]))
+        for k in reversed(range(self.coefficients.shape[1])):
+            x = x * theta + self.coefficients[pieces, k]
+        return x
+
+    def at_nodes(self) -> np.ndarray:
+        """States at the Gauss nodes of every piece, shape (pieces, 3, n)."""
+        every = np.arange(self.low.size)
+        return np.stack([self.at(every, self.low + node * (self.high - self.low)) for node in GAUSS_NODES], axis=1)
+
+
 @dataclass
 class Trajectory:
     """A run, finished or not: the accepted steps, the output grid if one was asked for, the events."""
 
-    steps: Recording
-    grid: Recording | None
+    steps: Rows
+    grid: Rows | None
     happenings: list[Happening]
     statistics: Statistics
     solver: str
-    pieces: Pieces = field(default_factory=Pieces)
+    pieces: Pieces = field(default_factory=Paths)
     status: str = "done"
     """``done``, ``stopped`` (by stop_when), ``failed`` or ``interrupted``."""
     error: str = ""
     warnings: list[str] = field(default_factory=list)
 
     @property
-    def shown(self) -> Recording:
+    def shown(self) -> Rows:
         """The rows a result is made of."""
         return self.grid if self.grid is not None else self.steps
 

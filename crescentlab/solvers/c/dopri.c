@@ -1,0 +1,73 @@
+/* DOPRI: explicit Runge-Kutta method of order 5(4), seven stages of which the last is the first of the next step.
+ *
+ *     k_i = f(t + c_i h, x + h sum_j a_ij k_j),     x_new = x + h sum_j a_7j k_j
+ *
+ * Between, the polynomial of order 4. Source: Dormand & Prince, J. Comp. Appl. Math. 6 (1980) 19-26; Shampine, Some
+ * practical Runge-Kutta formulas, Math. Comp. 46 (1986) 135-150.
+ */
+#include <string.h>
+
+#include "run.h"
+
+enum { STAGES = 7 };
+
+static const double c[STAGES] = {0, 1.0 / 5, 3.0 / 10, 4.0 / 5, 8.0 / 9, 1, 1};
+static const double a[STAGES][STAGES - 1] = {
+    {0},
+    {1.0 / 5},
+    {3.0 / 40, 9.0 / 40},
+    {44.0 / 45, -56.0 / 15, 32.0 / 9},
+    {19372.0 / 6561, -25360.0 / 2187, 64448.0 / 6561, -212.0 / 729},
+    {9017.0 / 3168, -355.0 / 33, 46732.0 / 5247, 49.0 / 176, -5103.0 / 18656},
+    {35.0 / 384, 0, 500.0 / 1113, 125.0 / 192, -2187.0 / 6784, 11.0 / 84},
+};
+static const double e[STAGES] = {
+    -71.0 / 57600, 0, 71.0 / 16695, -71.0 / 1920, 17253.0 / 339200, -22.0 / 525, 1.0 / 40,
+};
+static const double dense[STAGES][4] = {
+    {1, -8048581381.0 / 2820520608, 8663915743.0 / 2820520608, -12715105075.0 / 11282082432},
+    {0, 0, 0, 0},
+    {0, 131558114200.0 / 32700410799, -68118460800.0 / 10900136933, 87487479700.0 / 32700410799},
+    {0, -1754552775.0 / 470086768, 14199869525.0 / 1410260304, -10690763975.0 / 1880347072},
+    {0, 127303824393.0 / 49829197408, -318862633887.0 / 49829197408, 701980252875.0 / 199316789632},
+    {0, -282668133.0 / 205662961, 2019193451.0 / 616988883, -1453857185.0 / 822651844},
+    {0, 40617522.0 / 29380423, -110615467.0 / 29380423, 69997945.0 / 29380423},
+};
+
+static double attempt(Run *r, double h)
+{
+    const int64_t n = r->n;
+    double *const k = r->stages;
+    memcpy(k, r->rate, n * sizeof *k);
+    for (int s = 1; s < STAGES; s++) {
+        double *const x = s < STAGES - 1 ? r->work : r->x_new;
+        for (int64_t i = 0; i < n; i++) {
+            double sum = 0;
+            for (int j = 0; j < s; j++) sum += a[s][j] * k[j * n + i];
+            x[i] = r->x[i] + h * sum;
+        }
+        memcpy(k + s * n, rhs(r, r->t + c[s] * h, x), n * sizeof *k);
+    }
+    for (int64_t i = 0; i < n; i++) {
+        double sum = 0;
+        for (int j = 0; j < STAGES; j++) sum += e[j] * k[j * n + i];
+        r->work[i] = h * sum;
+    }
+    return error_norm(r, r->work);
+}
+
+static void finish(Run *r, double h)
+{
+    const int64_t n = r->n;
+    memcpy(r->coef, r->x, n * sizeof *r->coef);
+    memcpy(r->rate_new, r->stages + (STAGES - 1) * n, n * sizeof *r->rate_new);
+    for (int p = 0; p < 4; p++)
+        for (int64_t i = 0; i < n; i++) {
+            double sum = 0;
+            for (int j = 0; j < STAGES; j++) sum += dense[j][p] * r->stages[j * n + i];
+            r->coef[(p + 1) * n + i] = h * sum;
+        }
+    r->rate_exact = 1;
+}
+
+const Method dopri = {attempt, finish, 5, 4};

@@ -1,0 +1,50 @@
+"""Says in the circuit's words what a run failed on."""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy import sparse
+
+from crescentlab.errors import SimulationError
+from crescentlab.solvers.functions import Functions
+
+
+class Diagnosis:
+    """Names the state behind what is not finite, or behind steps that grow too short."""
+
+    def __init__(self, functions: Functions, rtol: float, atol: np.ndarray) -> None:
+        self.functions, self.rtol, self.atol = functions, rtol, atol
+        self.system = functions.system
+
+    def check_finite(self, t: float, x: np.ndarray, values: np.ndarray, when: str = "") -> None:
+        """Raise if ``values`` (x itself, or its rates) are not all finite numbers."""
+        bad = np.flatnonzero(~np.isfinite(values))
+        if bad.size:
+            name = self.system.state_names[int(bad[0])]
+            what = "is no longer a finite number" if values is x else "has a rate that is not a finite number"
+            raise SimulationError(
+                f"{name} {what} {when + ' ' if when else ''}(t = {t:.6g} s); "
+                f"look at the parameters of {name.rpartition('.')[0]} and at the start values"
+            )
+
+    def check_held(self, t: float, h: np.ndarray, names: list[str]) -> None:
+        """Raise if the events ``names`` left a held value that is not a finite number."""
+        wrong = np.flatnonzero(~np.isfinite(h))
+        if wrong.size:
+            name = self.system.held_names[int(wrong[0])]
+            raise SimulationError(
+                f"{name} was set to what is not a finite number by {', '.join(names)} (t = {t:.6g} s)"
+            )
+
+    def blame(self, t: float, x: np.ndarray) -> str:
+        """The state whose rate changes fastest against its tolerance."""
+        f = self.functions.rhs(t, x)
+        pattern = self.functions.pattern
+        matrix = sparse.csc_matrix(
+            (self.functions.nonzeros(t, x), pattern.indices, pattern.indptr), shape=pattern.shape
+        )
+        change = np.abs(matrix @ f) / (self.atol + self.rtol * np.abs(x))
+        if not np.isfinite(change).all():  # it has grown beyond all bounds: the largest state is to blame
+            change = np.abs(x) / self.system.nominal
+        name = self.system.state_names[int(np.argmax(change))]
+        return f"{name} limits it; try --solver bdf, a larger volume or mass there, or smoother signals"

@@ -1,0 +1,35 @@
+"""How a run is to be integrated, and the limits all solvers share."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+ANGLE_STEP = 0.3
+"""A step turns no angle further than this [rad], so that what depends on it is not stepped over."""
+LEAST_STEPS = 50
+"""No step is longer than this part of the run."""
+RESTART_SHARE = 1e-3
+"""A change of f that moves no state by more than this share of its tolerance over a step needs no restart; a sampled
+part makes thousands of such changes, and their sum must stay within the tolerance."""
+
+
+@dataclass(frozen=True)
+class Options:
+    """How to integrate; times in seconds."""
+
+    stop: float
+    start: float = 0.0
+    rtol: float = 1e-6
+    solver: str = "auto"
+    max_step: float | None = None
+    output_step: float | None = None
+
+    @property
+    def span(self) -> float:
+        """Length of the run [s]."""
+        return self.stop - self.start
+
+    @property
+    def step_cap(self) -> float:
+        """Longest step [s]."""
+        return min(self.max_step or float("inf"), self.span / LEAST_STEPS)
