@@ -80,9 +80,17 @@ static int side_of(const Run *r, double g, double rate, double scale, int64_t st
     return g > 0 || (g == 0 && !strict);
 }
 
-static void read_relations(Run *r)
+/* f and the relations at (t, x); together with f its linearisation, if a step that needs it is likely to follow. */
+static void read_relations(Run *r, int onward)
 {
-    memcpy(r->v_in, rhs(r, r->t, r->x), r->n * sizeof *r->v_in);
+    if (onward && r->method == RODAS) {
+        linearise(r, r->t, r->x);
+        memcpy(r->fx, r->lin_f, r->n * sizeof *r->fx);
+    } else {
+        rhs(r, r->t, r->x);
+        r->linearised = 0;
+    }
+    memcpy(r->v_in, r->fx, r->n * sizeof *r->v_in);
     if (r->n_bits) call(r, r->relation);
 }
 
@@ -92,11 +100,11 @@ static void now_switched(Run *r)
     if (r->curved_held) r->rescan = 1;
 }
 
-static int settle(Run *r)
+static int settle(Run *r, int onward)
 {
     for (int round = 0; round < MAX_SETTLING; round++) {
         int64_t other = -1;
-        read_relations(r);
+        read_relations(r, onward);
         for (int64_t k = r->n_bits - 1; k >= 0; k--) {
             r->want[k] = side_of(r, r->g[k], r->g_rate[k], r->g_scale[k], r->strict[k]);
             if (r->want[k] != r->b[k]) other = k;
@@ -156,10 +164,10 @@ static int64_t fires(Run *r, int64_t *ticks)
     return count;
 }
 
-/* Settle and fire at t in rounds. */
-static int fire(Run *r)
+/* Settle and fire at t in rounds; nothing needs settling first where nothing but ticks is due. */
+static int fire(Run *r, int only_ticks)
 {
-    int code = settle(r);
+    int code = only_ticks ? PAUSED : settle(r, 0);
     for (int round = 0; !code && round < MAX_ROUNDS; round++) {
         int64_t ticks, events = fires(r, &ticks);
         if (!events && !ticks) return PAUSED;
@@ -191,7 +199,7 @@ static int fire(Run *r)
                     if (!code) code = worry;
                 }
             }
-        if (!code) code = settle(r);
+        if (!code) code = settle(r, !events);
         if (!code && round == MAX_ROUNDS - 1) code = ENDLESS;
     }
     return code;
@@ -273,16 +281,18 @@ static int f_changed(const Run *r, const double *old)
 }
 
 /* Everything that happens at t: settle, fire, look ahead. */
-static int stop_here(Run *r, int start)
+static int stop_here(Run *r, int start, int landed)
 {
-    const int64_t events = r->events;
+    const int64_t events = r->events, ticks = r->ticks;
+    const int only_ticks = !start && !landed && !r->n_linear && !r->curved;
     for (int64_t k = 0; k < r->n_ticks; k++)
         if (r->start + (r->ticked[k] + 1) * r->period[k] <= r->t + r->tolerance) r->due[k] = 1, r->ticked[k]++;
     if (r->curved && r->curved_next <= r->t + r->tolerance) r->rescan = 1;
     r->jumped = 0;
     r->last_event = -1;
     if (start) r->switched = 1; /* the first world is that after the start */
-    int code = fire(r);
+    int code = fire(r, only_ticks);
+    if (!code && only_ticks && r->ticks == ticks) rhs(r, r->t, r->x); /* the end of the run */
     const int changed = r->jumped || r->switched;
     if (start || changed) record(r, !start);
     if (code) return code;
@@ -298,7 +308,6 @@ static int stop_here(Run *r, int start)
     }
     memcpy(r->rate, r->fx, r->n * sizeof *r->rate);
     r->rate_exact = 1;
-    r->linearised = 0;
     watch_from_here(r);
     find_goal(r);
     return r->rescan ? NEEDS_ROOT : PAUSED;
@@ -570,21 +579,21 @@ static int step(Run *r)
     r->tiny = h < SMALLEST * (r->stop - r->start) ? r->tiny + 1 : 0;
     if (r->tiny > COLLAPSE_COUNT) return COLLAPSED;
     if (event != 0 && !r->rate_exact) memcpy(r->rate, rhs(r, r->t, r->x), r->n * sizeof *r->rate), r->rate_exact = 1;
-    return event != 0 || r->t >= r->goal - r->tolerance ? stop_here(r, 0) : PAUSED;
+    return event != 0 || r->t >= r->goal - r->tolerance ? stop_here(r, 0, event != 0) : PAUSED;
 }
 
 static int begin(Run *r)
 {
     r->begun = 1;
     r->t = r->start;
-    read_relations(r);
+    read_relations(r, 0);
     for (int64_t i = 0; i < r->n; i++)
         if (!isfinite(r->fx[i])) return NOT_FINITE;
     for (int twice = 0; twice < 2; twice++) {
         for (int64_t k = 0; k < r->n_bits; k++) r->b[k] = r->g[k] > 0 || (r->g[k] == 0 && !r->strict[k]);
-        read_relations(r);
+        read_relations(r, 0);
     }
-    const int code = stop_here(r, 1);
+    const int code = stop_here(r, 1, 0);
     r->step = first_step(r);
     return code;
 }
