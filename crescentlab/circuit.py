@@ -108,9 +108,10 @@ class Circuit:
     def simulate(
         self, stop: str | float | None = None, parameters: Mapping[str, str | float] | None = None, *,
         solver: str | None = None, rtol: float | None = None, output_step: str | float | None = None,
-        max_step: str | float | None = None, progress: Callable[[float], None] | None = None, check: bool = True,
+        max_step: str | float | None = None, compile: bool | None = None,
+        progress: Callable[[float], None] | None = None, check: bool = True,
     ) -> Result:  # fmt: skip
-        """Integrate the circuit; text needs units, floats are SI.
+        """Integrate the circuit; text needs units, floats are SI. ``compile`` as for ``--compile``.
 
         Raises :class:`InputError` for wrong input, and, with ``check``, :class:`SimulationError` if the run
         fails, its ``result`` attribute holding what was computed.
@@ -122,6 +123,7 @@ class Circuit:
             stop=_time(stop, "stop", section.stop), rtol=section.rtol if rtol is None else rtol,
             solver=solver or section.solver, max_step=_time(max_step, "max_step", section.max_step),
             output_step=_time(output_step, "output_step", section.output_step),
+            compile=section.compile if compile is None else compile,
         )  # fmt: skip
         _check(options)
         values = system.values(design)

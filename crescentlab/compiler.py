@@ -1,7 +1,7 @@
 """C text -> shared library, by the machine's compiler, kept in a cache keyed by content.
 
-The key is made of the text, the flags, the compiler's version and the machine, so that nothing in the cache grows stale:
-what is looked up is what would be built. The cache lies in the user's cache folder; ``CRESCENTLAB_CACHE`` names another.
+The key is made of the text, the flags, the compiler and the machine, so that nothing in the cache grows stale: what is
+looked up is what would be built. The cache lies in the user's cache folder; ``CRESCENTLAB_CACHE`` names another.
 """
 
 from __future__ import annotations
@@ -14,6 +14,7 @@ import shlex
 import shutil
 import subprocess
 import tempfile
+import threading
 from collections.abc import Mapping
 from pathlib import Path
 
@@ -36,10 +37,11 @@ def command() -> tuple[str, ...]:
 
 
 @functools.cache
-def identity() -> str:
-    """The compiler's version and the machine it builds for."""
-    said = subprocess.run([*command(), "--version"], capture_output=True, text=True, check=False).stdout
-    return f"{said}{platform.system()} {platform.machine()}"
+def identity() -> tuple[object, ...]:
+    """What tells this compiler and this machine from others."""
+    program = Path(shutil.which(command()[0]) or "").resolve()
+    facts = program.stat()
+    return (*command(), str(program), facts.st_size, facts.st_mtime_ns, platform.system(), platform.machine())
 
 
 def cache() -> Path:
@@ -53,7 +55,7 @@ def place(sources: Mapping[str, str], flags: tuple[str, ...] = FLAGS) -> Path:
     return cache() / f"{key[:32]}.so"
 
 
-def build(sources: Mapping[str, str], flags: tuple[str, ...] = FLAGS) -> Path:
+def build(sources: Mapping[str, str], flags: tuple[str, ...] = FLAGS, job: Job | None = None) -> Path:
     """The library of C sources (file name -> text), built unless the cache has it.
 
     Raises :class:`CompilerError` without a compiler, if it fails, or if the cache cannot be written.
@@ -69,16 +71,48 @@ def build(sources: Mapping[str, str], flags: tuple[str, ...] = FLAGS) -> Path:
             for name, text in sources.items():
                 Path(folder, name).write_text(text, encoding="utf-8")
             units = [name for name in sources if name.endswith(".c")]
-            made = subprocess.run(
-                [*command(), *flags, *units, "-o", "made.so", "-lm"], cwd=folder, capture_output=True, text=True,
-                check=False,
+            running = subprocess.Popen(
+                [*command(), *flags, *units, "-o", "made.so", "-lm"], cwd=folder, text=True, stdout=subprocess.DEVNULL,
+                stderr=subprocess.PIPE,
             )  # fmt: skip
-            if made.returncode:
-                raise CompilerError(f"{shlex.join(command())} failed: {_first_error(made.stderr)}")
+            if job is not None:
+                job.process = running
+            said = running.communicate()[1]
+            if running.returncode:
+                raise CompilerError(f"{shlex.join(command())} failed: {_first_error(said)}")
             os.replace(Path(folder, "made.so"), target)  # another process may have been quicker: the same bytes
     except OSError as error:
         raise CompilerError(f"the cache {cache()} cannot be used ({error.strerror or error})") from None
     return target
+
+
+class Job(threading.Thread):
+    """Several libraries built one after another beside what the caller does meanwhile."""
+
+    def __init__(self, texts: Mapping[str, str]) -> None:
+        super().__init__(daemon=True)
+        self.texts = texts
+        self.libraries: dict[str, Path] = {}
+        self.process: subprocess.Popen[str] | None = None
+        self.cancelled = False
+        self.error: CompilerError | None = None
+
+    def run(self) -> None:
+        """Build all, unless cancelled."""
+        try:
+            for name, text in self.texts.items():
+                if self.cancelled:
+                    return
+                self.libraries[name] = build({"function.c": text}, job=self)
+        except CompilerError as error:
+            self.error = error
+
+    def cancel(self) -> None:
+        """Stop building, as soon as may be."""
+        self.cancelled = True
+        if self.is_alive() and self.process is not None:
+            self.process.terminate()
+            self.join(5)
 
 
 def _first_error(text: str) -> str:

@@ -79,6 +79,7 @@ class SimulationSection(_Section):
         default=None, gt=0, description="longest step; default from the circuit's own time scales"
     )
     output_step: Time | None = Field(default=None, gt=0, description="uniform output grid; default the accepted steps")
+    compile: bool | None = Field(default=None, description="compile the equations; default where it pays")
     stop_when: str | None = Field(default=None, description="a condition that ends the run: line.p > 9 bar")
 
 

@@ -6,15 +6,13 @@ of the tens of microseconds of an ordinary call.
 
 from __future__ import annotations
 
-import os
-from collections.abc import Mapping, Sequence
-from concurrent.futures import ThreadPoolExecutor
+from collections.abc import Sequence
 from dataclasses import dataclass
+from pathlib import Path
 
 import casadi as ca
 import numpy as np
 
-from crescentlab.compiler import build
 from crescentlab.symbols import column
 
 Array = np.ndarray
@@ -53,42 +51,40 @@ def prepare(name: str, arguments: list[ca.SX], p: ca.SX, outputs: list[ca.SX]) -
     return Prepared(ca.Function(name, [*arguments, q], pieces), ca.Function("q", [p], [ca.densify(column(parametric))]))
 
 
-def compiled(functions: Mapping[str, Prepared]) -> dict[str, Prepared]:
-    """The same functions as C, built by the machine's compiler or found in its cache: the same numbers, sooner.
-
-    Raises :class:`CompilerError`.
-    """
-    with ThreadPoolExecutor(max_workers=os.cpu_count()) as pool:
-        libraries = list(pool.map(lambda each: build({"function.c": c_text(each.function)}), functions.values()))
-    return {
-        name: Prepared(ca.external(each.function.name(), str(library)), each.parameters)
-        for (name, each), library in zip(functions.items(), libraries, strict=True)
-    }
-
-
-def c_text(function: ca.Function) -> str:
-    """A function in C."""
+def c_text(prepared: Prepared) -> str:
+    """The function in C."""
     generator = ca.CodeGenerator("function.c")
-    generator.add(function)
+    generator.add(prepared.function)
     return str(generator.dump())
+
+
+def from_library(prepared: Prepared, library: Path) -> Prepared:
+    """The same function out of a library built from its :func:`c_text`: the same numbers, sooner."""
+    return Prepared(ca.external(prepared.function.name(), str(library)), prepared.parameters)
 
 
 class Evaluator:
     """A prepared function called through its buffers, parameters fixed: a few nanoseconds an instruction."""
 
-    def __init__(self, prepared: Prepared, p: Array, shared: Sequence[Array] | None = None) -> None:
-        """With ``shared``, the function reads its arguments from these arrays, which others may read and fill, too."""
-        function = self.function = prepared.function
-        self.buffer, self.trigger = function.buffer()
+    def __init__(
+        self, prepared: Prepared, p: Array, inputs: Sequence[Array] = (), outputs: Sequence[Array] | None = None
+    ) -> None:
+        """The first arguments are read from ``inputs``, the results written to ``outputs``, where these are given."""
+        function = prepared.function
         self.sizes = [function.nnz_in(k) for k in range(function.n_in())]
-        own = self.sizes if shared is None else self.sizes[len(shared) :]
-        self.inputs = [*(shared or ()), *(np.zeros(max(n, 1)) for n in own)]
-        self.outputs = [np.zeros(max(function.nnz_out(k), 1)) for k in range(function.n_out())]
+        self.inputs = [*inputs, *(np.zeros(max(n, 1)) for n in self.sizes[len(inputs) :])]
+        self.outputs = outputs or [np.zeros(max(function.nnz_out(k), 1)) for k in range(function.n_out())]
         self.results = [out[: function.nnz_out(k)] for k, out in enumerate(self.outputs)]
         self.x = self.inputs[1][: self.sizes[1]]
         self.last_h: Array | None = None
         self.last_b: Array | None = None
         self.inputs[-1][: self.sizes[-1]] = np.array(prepared.parameters(p)).ravel()
+        self.use(function)
+
+    def use(self, function: ca.Function) -> None:
+        """Call this function from now on, another form of the same."""
+        self.function = function
+        self.buffer, self.trigger = function.buffer()
         for k, array in enumerate(self.inputs):
             self.buffer.set_arg(k, memoryview(array))  # type: ignore[call-arg, arg-type]  # CasADi's stub omits the view
         for k, array in enumerate(self.outputs):

@@ -10,8 +10,9 @@ remaps are CasADi functions; every other variable is an expression, made a funct
 from __future__ import annotations
 
 import functools
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
+from pathlib import Path
 from typing import Any
 
 import casadi as ca
@@ -22,7 +23,7 @@ from crescentlab.component import Component
 from crescentlab.domain import Held, State
 from crescentlab.elaborate import Design
 from crescentlab.errors import InputError, nearest
-from crescentlab.prepared import Prepared, compiled, prepare
+from crescentlab.prepared import Prepared, c_text, from_library, prepare
 from crescentlab.trace import numeric_fields, structure_of
 from crescentlab.units import Quantity
 
@@ -177,14 +178,14 @@ class System:
         fired, outputs = self._remap(may_fire)
         return prepare("remap", [*self.arguments[:-1], fired], self.p, outputs)
 
-    def compile(self, names: Iterable[str]) -> None:
-        """Let the functions of these names be C from now on, whoever calls them: the same numbers, sooner.
+    def c_texts(self, names: Iterable[str]) -> dict[str, str]:
+        """C of the functions of these names that are not compiled yet."""
+        return {name: c_text(getattr(self, name)) for name in names if name not in self.in_c}
 
-        Raises :class:`CompilerError` on a machine that cannot, and leaves them as they are.
-        """
-        left = {name: getattr(self, name) for name in names if name not in self.in_c}
-        vars(self).update(compiled(left))
-        self.in_c.update(left)
+    def adopt(self, libraries: Mapping[str, Path]) -> None:
+        """Take functions from libraries built of :meth:`c_texts`: the same numbers, sooner, whoever calls them."""
+        vars(self).update({name: from_library(getattr(self, name), path) for name, path in libraries.items()})
+        self.in_c.update(libraries)
 
     @functools.cached_property
     def period(self) -> ca.Function:

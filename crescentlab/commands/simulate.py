@@ -35,7 +35,7 @@ def run(options: argparse.Namespace) -> int:
     with _progress(options.quiet) as progress:
         result = circuit.simulate(
             options.stop, values, solver=options.solver, rtol=options.rtol, output_step=options.output_step,
-            progress=progress, check=False,
+            compile=options.compile, progress=progress, check=False,
         )  # fmt: skip
     status = result.trajectory.status
     log.info("integrated in %.3f s: %s", result.trajectory.statistics.wall_s, status)

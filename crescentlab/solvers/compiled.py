@@ -13,7 +13,7 @@ from collections.abc import Callable
 import numpy as np
 
 from crescentlab import units
-from crescentlab.errors import SimulationError
+from crescentlab.errors import CompilerError, SimulationError
 from crescentlab.prepared import Evaluator
 from crescentlab.solvers import native
 from crescentlab.solvers.diagnosis import Diagnosis
@@ -23,12 +23,27 @@ from crescentlab.solvers.hybrid import ZENO_SPAN, Hybrid
 from crescentlab.solvers.limits import PressureLimits
 from crescentlab.solvers.options import ANGLE_STEP, RESTART_SHARE, Options
 from crescentlab.solvers.pace import CLOCK_SWING, clock_pace
+from crescentlab.solvers.promotion import Promotion
 from crescentlab.solvers.roots import waves
 from crescentlab.solvers.trajectory import Happening, Polynomials, Rows, Statistics, Trajectory
 from crescentlab.system import System, Values
 
+LOOK = 0.1
+"""Seconds between two signs of progress."""
 BLOCK = 1000
 """Most steps between two looks of Python, which shows progress and hears an interruption."""
+FIELDS = {
+    "rhs": "rhs", "linear": "linear", "relation": "relation", "relation_on_state": "watch", "condition": "condition",
+    "remap": "remap", "remap_ticks": "remap_ticks", "remap_events": "remap_events",
+}  # fmt: skip
+"""Functions of the system, and the field of the loop's structure that calls each."""
+OUTPUTS = {
+    "rhs": ("fx",), "linear": ("lin_f", "jacobian", "lin_t"), "relation": ("g", "g_rate", "g_scale"),
+    "relation_on_state": ("w", "w_rate", "w_scale"), "condition": ("conditions",),
+}  # fmt: skip
+"""Fields of their outputs; remaps write new_x and new_h."""
+SAVING = 0.6
+"""Share of a run that compiled functions save."""
 COMMON = ("rhs", "relation", "relation_on_state", "condition", "remap", "remap_ticks", "remap_events")
 FUNCTIONS = {"rodas": (*COMMON, "linear"), "dopri": COMMON}
 """Functions of the system that each method calls."""
@@ -44,19 +59,31 @@ def integrate(
     return _CompiledRun(system, values, options, progress).run()
 
 
+def possible() -> bool:
+    """Whether this machine can build the loop, or has built it."""
+    try:
+        native.library()
+        native.call_function()
+    except CompilerError:
+        return False
+    return True
+
+
 class _CompiledRun:
     def __init__(
         self, system: System, values: Values, options: Options, progress: Callable[[float], None] | None
     ) -> None:
         self.system, self.values, self.options, self.progress = system, values, options, progress
         self.library = native.library()
+        self.warnings: list[str] = []
+        self.promotion = Promotion(system, FUNCTIONS[options.solver], options.compile, SAVING)
+        self.warnings += [notice] if (notice := self.promotion.before()) else []
         self.hybrid = Hybrid(system, values, options.start, options.stop)
         self.atol = options.rtol * system.nominal
         self.diagnosis = Diagnosis(Functions(system, values), options.rtol, self.atol)
         self.limits = PressureLimits(system)
-        self.warnings: list[str] = []
+        self.tension: str | None = None
         self.blocks: list[dict[str, np.ndarray]] = []
-        self.shown_at = 0.0
         self.run_ = native.Run()
         self.set_sizes()
         self.set_functions()
@@ -84,29 +111,32 @@ class _CompiledRun:
         r.give(t_in=t, x_in=x, h=h, b=b, v_in=v, flags=flags)
         h[: r.n_held] = self.values.h0
         r.trigger = native.call_function()
-        self.evaluators: list[Evaluator] = []
+        self.evaluators: dict[str, list[Evaluator]] = {}
+        new = [_room(r.n), _room(r.n_held)]
+        r.give(new_x=new[0], new_h=new[1])
+        self.fields = dict(FIELDS)
+        if self.options.solver != "rodas":
+            self.fields.pop("linear")
+        if not system.events:
+            self.fields = {name: field for name, field in self.fields.items() if not name.startswith("remap")}
+        more = {
+            "relation": [v],
+            "relation_on_state": [v],
+            "remap": [flags],
+            "remap_ticks": [flags],
+            "remap_events": [flags],
+        }
+        for name in self.fields:
+            outputs = new if name.startswith("remap") else None
+            evaluator = Evaluator(getattr(system, name), p, [t, x, h, b, *more.get(name, [])], outputs)
+            self.evaluators[name] = [evaluator]
+            r.give(**dict(zip(OUTPUTS.get(name, ()), evaluator.outputs, strict=False)))
+        self.set_addresses()
 
-        def bind(field: str, name: str, outputs: tuple[str, ...], *more: np.ndarray) -> None:
-            evaluator = Evaluator(getattr(system, name), p, [t, x, h, b, *more])
-            self.evaluators.append(evaluator)
-            setattr(r, field, native.address_of(evaluator.buffer))
-            r.give(**dict(zip(outputs, evaluator.outputs, strict=True)))
-
-        bind("rhs", "rhs", ("fx",))
-        if self.options.solver == "rodas":
-            bind("linear", "linear", ("lin_f", "jacobian", "lin_t"))
-        bind("relation", "relation", ("g", "g_rate", "g_scale"), v)
-        bind("watch", "relation_on_state", ("w", "w_rate", "w_scale"), v)
-        bind("condition", "condition", ("conditions",))
-        if system.events:
-            new = [_room(r.n), _room(r.n_held)]
-            r.give(new_x=new[0], new_h=new[1])
-            for name in ("remap", "remap_ticks", "remap_events"):
-                evaluator = Evaluator(getattr(system, name), p, [t, x, h, b, flags])
-                for k, array in enumerate(new):
-                    evaluator.buffer.set_res(k, memoryview(array))
-                self.evaluators.append(evaluator)
-                setattr(r, name, native.address_of(evaluator.buffer))
+    def set_addresses(self) -> None:
+        """Tell the loop where its functions are."""
+        for name, field in self.fields.items():
+            setattr(self.run_, field, native.address_of(self.evaluators[name][0].buffer))
 
     def set_relations_and_events(self) -> None:
         r, hybrid, system = self.run_, self.hybrid, self.system
@@ -178,7 +208,7 @@ class _CompiledRun:
     # -- the run ---------------------------------------------------------------------------------
 
     def run(self) -> Trajectory:
-        begun = time.perf_counter()
+        begun = self.begun = self.shown_at = time.perf_counter()
         status, error = "done", ""
         try:
             status = self.advance()
@@ -188,6 +218,7 @@ class _CompiledRun:
         except KeyboardInterrupt:
             status, error = "interrupted", f"interrupted at {self.run_.t:.6g} s; what was computed is kept"
         self.drain()
+        self.promotion.end()
         wall = time.perf_counter() - begun
         r = self.run_
         statistics = Statistics(
@@ -228,9 +259,14 @@ class _CompiledRun:
         self.library.find_goal(ctypes.byref(r))
 
     def report(self) -> None:
-        if self.progress is not None and (now := time.perf_counter()) - self.shown_at > 0.1:
-            self.shown_at = now
-            self.progress((self.run_.t - self.options.start) / self.options.span)
+        if (now := time.perf_counter()) - self.shown_at < LOOK:
+            return
+        self.shown_at = now
+        share = (self.run_.t - self.options.start) / self.options.span
+        if self.progress is not None:
+            self.progress(share)
+        if self.promotion.look(now - self.begun, share, self.evaluators):
+            self.set_addresses()
 
     @property
     def x(self) -> np.ndarray:
@@ -308,7 +344,7 @@ class _CompiledRun:
         block["piece_length"] = high - low
         self.blocks.append(block)
         r.rows = r.pieces = r.worlds = r.logs = 0
-        if not self.warnings and any(self.limits.states[3]):
+        if not self.tension and any(self.limits.states[3]):
             self.warn(block)
 
     def warn(self, block: dict[str, np.ndarray]) -> None:
@@ -317,6 +353,7 @@ class _CompiledRun:
         if below.size:
             k = int(below[0])
             warning = self.limits.look(float(block["row_t"][k]), block["row_x"][k], *self.limits.states)
+            self.tension = warning
             self.warnings += [warning] if warning else []
 
     def joined(self, name: str) -> np.ndarray:
@@ -329,7 +366,9 @@ class _CompiledRun:
         """Accepted steps and events."""
         if not self.blocks:
             v = self.values
-            return Rows(np.array([self.options.start]), v.x0[None], v.h0[None], np.zeros((1, self.run_.n_bits)), _whole([])[:0])
+            return Rows(
+                np.array([self.options.start]), v.x0[None], v.h0[None], np.zeros((1, self.run_.n_bits)), _whole([])[:0]
+            )
         return Rows(
             self.joined("row_t"), self.joined("row_x"), self.of_world("row_world", "world_h"),
             self.of_world("row_world", "world_b"), np.flatnonzero(self.joined("row_jump")),
@@ -339,7 +378,9 @@ class _CompiledRun:
         """The polynomials of the accepted steps."""
         if not self.blocks:
             r, none = self.run_, np.zeros(0)
-            return Polynomials(none, none, none, np.zeros((0, 1, r.n)), np.zeros((0, r.n_held)), np.zeros((0, r.n_bits)))
+            return Polynomials(
+                none, none, none, np.zeros((0, 1, r.n)), np.zeros((0, r.n_held)), np.zeros((0, r.n_bits))
+            )
         return Polynomials(
             self.joined("piece_low"), self.joined("piece_high"), self.joined("piece_length"),
             self.joined("piece_coef"), self.of_world("piece_world", "world_h"), self.of_world("piece_world", "world_b"),

@@ -36,10 +36,16 @@ class Functions:
         return sparse.csc_matrix((np.ones(rows.size), rows, start), shape=(self.n, self.n))
 
     @functools.cached_property
-    def _jacobian(self) -> Evaluator:
+    def jacobian(self) -> Evaluator:
+        """Nonzeros of the Jacobian in column order."""
         return Evaluator(self.system.jacobian, self.values.p)
+
+    @property
+    def uses_jacobian(self) -> bool:
+        """Whether anybody has asked for the Jacobian."""
+        return "jacobian" in vars(self)
 
     def nonzeros(self, t: float, x: np.ndarray) -> np.ndarray:
         """Nonzeros of the Jacobian in column order; overwritten by the next call."""
         self.jacobians += 1
-        return self._jacobian(t, x, self.h, self.b)[0]
+        return self.jacobian(t, x, self.h, self.b)[0]

@@ -50,7 +50,7 @@ class Hybrid:
         self.ticking = [k for k, e in enumerate(system.events) if e.kind == "every"]
         self.periods = np.array(system.period(values.p)).ravel() if self.ticking else np.zeros(0)
         self.ticked = np.zeros(len(self.ticking), dtype=int)
-        self.remap = Evaluator(system.remap, values.p) if system.events else None
+        self.remaps: dict[str, Evaluator] = {}
         self.recent: dict[str, deque[float]] = {}
         self.time_tolerance = max(1e-13 * self.span, 8 * EPS * max(abs(start), abs(stop)))
         """How closely roots are located [s]."""
@@ -60,6 +60,19 @@ class Hybrid:
         self.curved_roots: list[float] = []
         self.scanned: float | None = None
         """Until when curved relations on time have been scanned; None: not yet."""
+
+    def remap(self, ticks: bool, events: bool) -> Evaluator:
+        """What sets states and held values when ticks, events, or both fire."""
+        name = "remap" if ticks and events else "remap_ticks" if ticks else "remap_events"
+        if name not in self.remaps:
+            self.remaps[name] = Evaluator(getattr(self.system, name), self.p)
+        return self.remaps[name]
+
+    def evaluators(self) -> dict[str, Evaluator]:
+        """What calls the system's functions, f aside, by their names."""
+        return {
+            "relation": self._relation, "relation_on_state": self._watched, "condition": self.condition, **self.remaps,
+        }  # fmt: skip
 
     def relation(self, t: float, x: np.ndarray, rate: np.ndarray | None = None) -> list[np.ndarray]:
         """Relations, their rates and magnitudes; ``rate`` is dx/dt where the caller knows it."""
@@ -116,8 +129,8 @@ class Hybrid:
         self.settle(t, x)
         names: list[str] = []
         for _ in range(MAX_ROUNDS):
-            fired = self.edges(t, x)
-            fired += [self.ticking[k] for k in due]
+            ticks = [self.ticking[k] for k in due]
+            fired = self.edges(t, x) + ticks
             if not fired:
                 return x, names
             due = []
@@ -125,8 +138,7 @@ class Hybrid:
             names += [self.system.events[k].name for k in fired]
             flags = np.zeros(len(self.system.events))
             flags[fired] = 1.0
-            assert self.remap is not None
-            new_x, new_h = self.remap(t, x, self.h, self.b, flags)
+            new_x, new_h = self.remap(bool(ticks), len(fired) > len(ticks))(t, x, self.h, self.b, flags)
             x, held = new_x.copy(), new_h.copy()
             if not np.array_equal(held, self.h):
                 self.h = held

@@ -3,22 +3,42 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 
-from crescentlab.solvers import loop
+from crescentlab.errors import CompilerError
+from crescentlab.solvers import compiled, loop
 from crescentlab.solvers.options import Options
 from crescentlab.solvers.trajectory import Trajectory
 from crescentlab.system import System, Values
 
-COMPILED = ("rodas", "dopri")
-"""Methods of the compiled loop."""
+INSTEAD = {"rodas": "auto", "dopri": "rk45"}
+"""The compiled methods, and what runs on a machine that cannot build them."""
+TIGHT = 1e-7
+"""``auto`` leaves smaller tolerances to methods of higher order than that of rodas."""
+
+Progress = Callable[[float], None] | None
 
 
-def integrate(
-    system: System, values: Values, options: Options, progress: Callable[[float], None] | None = None
-) -> Trajectory:
-    """Run the system; failures and interruptions end up in the trajectory's status, nothing is lost."""
-    if options.solver in COMPILED:
-        from crescentlab.solvers import compiled
+def integrate(system: System, values: Values, options: Options, progress: Progress = None) -> Trajectory:
+    """Run the system; failures and interruptions end up in the trajectory's status, nothing is lost.
 
-        return compiled.integrate(system, values, options, progress)
+    ``auto`` begins with SciPy's LSODA or BDF. If the run turns out to need very many steps, and this machine can build
+    the compiled loop, it is begun anew with ``rodas``: what decides is a count of steps, not a time, so that the same
+    run goes the same way again.
+    """
+    if options.solver in INSTEAD:
+        try:
+            return compiled.integrate(system, values, options, progress)
+        except CompilerError as error:
+            other = replace(options, solver=INSTEAD[options.solver])
+            done = loop.integrate(system, values, other, progress)
+            done.warnings.insert(0, f"{options.solver} needs a C compiler, {done.solver} ran instead: {error}")
+            return done
+    if options.solver == "auto" and options.rtol >= TIGHT:
+        try:
+            return loop.integrate(system, values, options, progress, give_up=compiled.possible)
+        except loop.TooManyStepsError:
+            done = compiled.integrate(system, values, replace(options, solver="rodas"), progress)
+            done.solver = f"auto: {done.solver}"
+            return done
     return loop.integrate(system, values, options, progress)

@@ -10,12 +10,14 @@ import numpy as np
 
 from crescentlab import units
 from crescentlab.errors import SimulationError
+from crescentlab.prepared import Evaluator
 from crescentlab.solvers.diagnosis import Diagnosis
 from crescentlab.solvers.functions import Functions
 from crescentlab.solvers.hybrid import Hybrid
 from crescentlab.solvers.limits import PressureLimits
 from crescentlab.solvers.options import ANGLE_STEP, RESTART_SHARE, Options
 from crescentlab.solvers.pace import CLOCK_SWING, clock_pace
+from crescentlab.solvers.promotion import Promotion
 from crescentlab.solvers.roots import RootFinder
 from crescentlab.solvers.scipy import Stepper, stepper
 from crescentlab.solvers.trajectory import Happening, Paths, Recording, Statistics, Trajectory
@@ -24,13 +26,38 @@ from crescentlab.system import System, Values
 SMALLEST_STEP = 1e-14
 """Steps below this share of the span, many in a row, are a collapse."""
 COLLAPSE_COUNT = 500
+MANY_STEPS = 30_000
+"""So many steps of SciPy's take longer than building the compiled loop and what it then needs."""
+FIRST_COUNT = 1000
+"""After so many steps, and every time they have doubled, those ahead are counted."""
+LOOK = 0.1
+"""Seconds between two signs of progress."""
+SAVING = 0.3
+"""Share of a run that compiled functions save."""
+
+
+def functions_of(solver: str) -> list[str]:
+    """Functions of the system that a run with this solver calls often."""
+    explicit = solver in ("rk45", "dop853")
+    names = ["rhs", "jacobian", "relation", "relation_on_state", "condition", "remap_ticks", "remap_events"]
+    return [name for name in names if not (explicit and name == "jacobian")]
+
+
+class TooManyStepsError(Exception):
+    """The run would take so many steps that the compiled loop should do it."""
 
 
 def integrate(
-    system: System, values: Values, options: Options, progress: Callable[[float], None] | None = None
-) -> Trajectory:
-    """Run the system; failures and interruptions end up in the trajectory's status, nothing is lost."""
-    return _Run(system, values, options, progress).run()
+    system: System, values: Values, options: Options, progress: Callable[[float], None] | None = None,
+    give_up: Callable[[], bool] | None = None,
+) -> Trajectory:  # fmt: skip
+    """Run the system; failures and interruptions end up in the trajectory's status, nothing is lost.
+
+    With ``give_up``, raises :class:`TooManyStepsError` if more than ``MANY_STEPS`` lie ahead and it says yes.
+    """
+    run = _Run(system, values, options, progress)
+    run.give_up = give_up
+    return run.run()
 
 
 class _Run:
@@ -38,6 +65,8 @@ class _Run:
         self, system: System, values: Values, options: Options, progress: Callable[[float], None] | None
     ) -> None:
         self.system, self.values, self.options, self.progress = system, values, options, progress
+        self.promotion = Promotion(system, functions_of(options.solver), options.compile, SAVING)
+        self.warnings = [notice] if (notice := self.promotion.before()) else []
         self.functions = Functions(system, values)
         self.hybrid = Hybrid(system, values, options.start, options.stop)
         self.roots = RootFinder(self.hybrid)
@@ -50,7 +79,6 @@ class _Run:
         self.grid_count = 0
         self.pieces = Paths()
         self.happenings: list[Happening] = []
-        self.warnings: list[str] = []
         self.ticks = {event.name for event in system.events if event.kind == "every"}
         self.angles = [k for k, q in enumerate(system.state_quantities) if q is units.angle]
         self.limits = PressureLimits(system)
@@ -59,12 +87,13 @@ class _Run:
         self.step_cap = options.step_cap
         self.pace = clock_pace(system, values, options.start, options.stop)
         self.tiny = 0
-        self.shown_at = 0.0
+        self.give_up: Callable[[], bool] | None = None
+        self.count_at = FIRST_COUNT
 
     # -- the run ---------------------------------------------------------------------------------
 
     def run(self) -> Trajectory:
-        begun = time.perf_counter()
+        begun = self.begun = self.shown_at = time.perf_counter()
         status, error = "done", ""
         try:
             with np.errstate(all="ignore"):  # what is not finite is told by name, not by a warning
@@ -75,6 +104,7 @@ class _Run:
             status, error = "failed", self.told(str(problem))
         except KeyboardInterrupt:
             status, error = "interrupted", f"interrupted at {self.now():.6g} s; what was computed is kept"
+        self.promotion.end()
         s = self.statistics
         s.wall_s = time.perf_counter() - begun
         s.evaluations, s.jacobians = self.functions.evaluations, self.functions.jacobians
@@ -274,9 +304,27 @@ class _Run:
             self.grid.add(t, x, self.hybrid.h, self.hybrid.b)
 
     def report(self, t: float) -> None:
-        if self.progress is not None and (now := time.perf_counter()) - self.shown_at > 0.1:
-            self.shown_at = now
-            self.progress((t - self.options.start) / self.options.span)
+        if self.give_up is not None and self.statistics.steps >= self.count_at:
+            self.count_at *= 2
+            done = (t - self.options.start) / self.options.span
+            if self.statistics.steps * (1 - done) > MANY_STEPS * done and self.give_up():
+                self.promotion.end()
+                raise TooManyStepsError
+        if (now := time.perf_counter()) - self.shown_at < LOOK:
+            return
+        self.shown_at = now
+        share = (t - self.options.start) / self.options.span
+        if self.progress is not None:
+            self.progress(share)
+        self.promotion.look(now - self.begun, share, self.evaluators())
+
+    def evaluators(self) -> dict[str, list[Evaluator]]:
+        """What calls the system's functions, by their names."""
+        found = {"rhs": [self.functions.f, self.hybrid.f]}
+        found |= {name: [evaluator] for name, evaluator in self.hybrid.evaluators().items()}
+        if self.functions.uses_jacobian:
+            found["jacobian"] = [self.functions.jacobian]
+        return found
 
     # -- checks ----------------------------------------------------------------------------------
 

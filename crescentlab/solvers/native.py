@@ -8,10 +8,11 @@ from __future__ import annotations
 import ctypes
 import functools
 import re
+import sys
 from importlib import resources
 from typing import Any
 
-import casadi as ca
+import casadi  # noqa: F401  # loads the library looked into below
 import numpy as np
 
 from crescentlab.compiler import FLAGS, build
@@ -94,7 +95,7 @@ def library() -> ctypes.CDLL:
 def call_function() -> int:
     """Address of CasADi's evaluation of a function through its buffers; raises :class:`CompilerError` without it."""
     try:
-        found = ctypes.CDLL(ca._casadi.__file__)[CALL_FUNCTION]
+        found = ctypes.CDLL(sys.modules["casadi._casadi"].__file__)[CALL_FUNCTION]
     except (OSError, AttributeError):
         raise CompilerError("this build of CasADi does not let its functions be called from C") from None
     address = ctypes.cast(found, ctypes.c_void_p).value

@@ -23,6 +23,8 @@ class Options:
     solver: str = "auto"
     max_step: float | None = None
     output_step: float | None = None
+    compile: bool | None = None
+    """Whether functions are compiled; None: when it pays."""
 
     @property
     def span(self) -> float:

@@ -69,8 +69,9 @@ class Recording:
 
     def done(self) -> Rows:
         """The rows as arrays."""
-        arrays = (np.array(rows) for rows in (self.t, self.x, self.h, self.b))
-        return Rows(*arrays, np.array(self.jumps, dtype=int))
+        return Rows(
+            np.array(self.t), np.array(self.x), np.array(self.h), np.array(self.b), np.array(self.jumps, dtype=int)
+        )
 
 
 GAUSS_NODES = (np.array([-np.sqrt(0.6), 0.0, np.sqrt(0.6)]) + 1) / 2
