@@ -1,0 +1,340 @@
+"""The compiled loop and compiled functions: the methods' orders, the sparse LU, the cache, and what happens without a
+compiler. What all solvers must do alike stands in test_solvers.py and test_hybrid.py."""
+
+from __future__ import annotations
+
+import ctypes
+import os
+import stat
+from pathlib import Path
+
+import numpy as np
+import pytest
+from building import alone, circuit
+from pydantic import Field
+from scipy import sparse
+
+import crescentlab as cl
+from crescentlab import compiler
+from crescentlab.component import Component
+from crescentlab.domain import state
+from crescentlab.errors import CompilerError
+from crescentlab.maths import cos, exp, sin
+from crescentlab.solvers import integrate as integration
+from crescentlab.solvers import loop, native, promotion
+from crescentlab.solvers.elimination import elimination
+from crescentlab.units import Ratio
+
+ORDERS = {"rodas": 4, "dopri": 5}
+PARTS = {
+    "pump": {"type": "flow_source", "flow": "30 L/min"}, "line": {"type": "capacity", "volume": "70 cm^3"},
+    "hole": {"type": "orifice", "area": "10 mm^2"}, "tank": {"type": "tank"},
+}  # fmt: skip
+NETS = {"p": ["pump.port", "line.port", "hole.a"], "t": ["hole.b", "tank.port"]}
+OIL = {"type": "simple_oil", "density": "870 kg/m^3", "kinematic_viscosity": "40 cSt", "bulk_modulus": "1.6 GPa"}
+
+
+@pytest.fixture
+def own_cache(tmp_path, monkeypatch):
+    """An empty cache."""
+    monkeypatch.setenv("CRESCENTLAB_CACHE", str(tmp_path))
+    return tmp_path
+
+
+@pytest.fixture
+def no_compiler(monkeypatch):
+    """A machine without a C compiler."""
+    monkeypatch.setattr(compiler, "command", lambda: ())
+    native.library.cache_clear()
+    yield
+    native.library.cache_clear()
+
+
+def plain(name, start=0.0):
+    """A state without unit."""
+    return state(Ratio, name, start=start, nominal=1.0)
+
+
+# -- the methods ---------------------------------------------------------------------------------
+
+
+class Turning(Component):
+    """A nonlinear pair driven in time: radius exp(sin t), angle t + sin(2 t)/2, and a pull back to that solution."""
+
+    x = plain("x", 1.0)
+    y = plain("y", 0.0)
+
+    def equations(self, t, x, y):
+        grow, turn = cos(t), 1 + cos(2 * t)
+        pull = (x * x + y * y) * exp(-2 * sin(t)) - 1  # zero on the solution
+        return {"der_x": (grow - pull) * x - turn * y, "der_y": (grow - pull) * y + turn * x}
+
+
+def exact(t):
+    """Solution of :class:`Turning`."""
+    return np.exp(np.sin(t)) * np.cos(t + np.sin(2 * t) / 2)
+
+
+@pytest.mark.parametrize(("solver", "steps"), [("rodas", (0.01, 0.005, 0.0025)), ("dopri", (0.04, 0.02, 0.01))])
+def test_order_of_convergence(solver, steps):
+    """Halving fixed steps divides the error by 2^order: Hairer & Wanner IV.7 (RODAS), Dormand & Prince (1980).
+
+    0.3 is what is left of the next order's term at these steps. The fourth-order term of RODAS is so small that with
+    longer steps the fifth-order one hides it.
+    """
+    errors = []
+    for step in steps:
+        result = alone(Turning).simulate(2.0, solver=solver, rtol=0.5, max_step=step)
+        assert result.trajectory.statistics.steps == pytest.approx(2.0 / step, abs=3)
+        errors.append(np.max(np.abs(result["part.x"] - exact(result.time))))
+    observed = np.log2(errors[:-1]) - np.log2(errors[1:])
+    assert observed[-1] == pytest.approx(ORDERS[solver], abs=0.3)
+
+
+@pytest.mark.parametrize(("solver", "order"), [("rodas", 3), ("dopri", 4)])
+def test_order_between_the_steps(solver, order):
+    """The polynomials are of one order less (local error h^(order + 1)): sampled on a fine grid between the steps."""
+    errors = []
+    for step in (0.04, 0.02, 0.01):
+        result = alone(Turning).simulate(2.0, solver=solver, rtol=0.5, max_step=step, output_step=1e-3)
+        errors.append(np.max(np.abs(result["part.x"] - exact(result.time))))
+    observed = np.log2(errors[:-1]) - np.log2(errors[1:])
+    assert observed[-1] > order + 0.6
+
+
+@pytest.mark.parametrize("solver", ORDERS)
+@pytest.mark.parametrize("rtol", [1e-4, 1e-6, 1e-8])
+def test_the_tolerance_is_kept(solver, rtol):
+    """Errors of each step add up over two time units, and grow with the solution (by e): below a hundred tolerances."""
+    result = alone(Turning).simulate(2.0, solver=solver, rtol=rtol)
+    assert np.max(np.abs(result["part.x"] - exact(result.time))) < 100 * rtol
+
+
+class Chemistry(Component):
+    """Robertson's reaction: rates from 0.04 to 3e7, the classic stiff problem."""
+
+    a = plain("a", 1.0)
+    b = plain("b", 0.0)
+    c = plain("c", 0.0)
+
+    def equations(self, a, b, c):
+        made = 0.04 * a - 1e4 * b * c
+        return {"der_a": -made, "der_b": made - 3e7 * b * b, "der_c": 3e7 * b * b}
+
+
+def test_robertson():
+    """At t = 40: 0.7158, 9.185e-6, 0.2842; Hairer & Wanner (1996), section IV.10. Their sum stays 1.
+
+    Two hundred steps suffice, of which a method that is not L-stable would need a hundred thousand.
+    """
+    result = alone(Chemistry).simulate(40.0, solver="rodas", rtol=1e-8)
+    last = [result[f"part.{name}"][-1] for name in "abc"]
+    np.testing.assert_allclose(last, [0.7158270688, 9.185534765e-6, 0.2841637457], rtol=1e-6)
+    assert sum(last) == pytest.approx(1.0, abs=1e-12)
+    assert result.trajectory.statistics.steps < 1000
+
+
+# -- linear algebra ------------------------------------------------------------------------------
+
+
+def random_pattern(n, density, seed):
+    """A random sparse matrix with the nonzeros of a Jacobian, by columns."""
+    made = sparse.random_array((n, n), density=density, rng=np.random.default_rng(seed), format="csc")
+    made.sort_indices()
+    return sparse.csc_matrix(made)
+
+
+@pytest.mark.parametrize(("n", "density"), [(1, 1.0), (2, 0.0), (7, 0.3), (40, 0.05), (40, 1.0), (300, 0.01)])
+def test_sparse_lu_solves(n, density):
+    """(shift I - J) v = r as numpy's dense solver has it, to rounding (the matrix is well conditioned)."""
+    jacobian = random_pattern(n, density, n)
+    found = elimination(jacobian)
+    run = native.Run()
+    run.n, run.nonzeros = n, jacobian.nnz
+    arrays = {name: np.asarray(getattr(found, name), np.int64) for name in ("row", "column", "diagonal", "order")}
+    arrays["place"] = np.append(found.place, 0).astype(np.int64)
+    run.give(
+        **arrays, jacobian=np.append(jacobian.data, 0.0), lu=np.zeros(found.column.size), inverse=np.zeros(n),
+        lu_work=np.zeros(n),
+    )  # fmt: skip
+    library = native.library()
+    shift, right = 2.0 * n, np.random.default_rng(0).normal(size=n)
+    assert library.factorise(ctypes.byref(run), ctypes.c_double(shift)) == 0
+    v = right.copy()
+    library.solve(ctypes.byref(run), ctypes.c_void_p(v.ctypes.data))
+    np.testing.assert_allclose(v, np.linalg.solve(shift * np.eye(n) - jacobian.todense(), right), rtol=1e-10)
+
+
+def test_a_chain_brings_no_fill():
+    """A tridiagonal matrix of 500 rows keeps its 1498 entries, in whatever order its rows are numbered."""
+    n = 500
+    shuffled = np.random.default_rng(3).permutation(n)
+    chain = sparse.diags_array([np.ones(n - 1), np.ones(n), np.ones(n - 1)], offsets=[-1, 0, 1]).tocsc()
+    assert elimination(sparse.csc_matrix(chain[shuffled][:, shuffled])).column.size == 3 * n - 2
+
+
+# -- compiled functions --------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("solver", ["rodas", "dopri", "lsoda", "radau"])
+def test_compiled_functions_change_no_bit(solver):
+    """The same operations in the same order: equal to the last bit, or the cache's state would be seen in results."""
+    results = [
+        cl.load("relief_valve").simulate(stop="5 ms", solver=solver, compile=compile) for compile in (False, True)
+    ]
+    for interpreted, compiled in zip(*(r.trajectory.steps.arrays() for r in results), strict=True):
+        np.testing.assert_array_equal(interpreted, compiled)
+
+
+def test_another_value_needs_no_compiler(own_cache, monkeypatch):
+    """Parameters enter as numbers: what was compiled for one value serves every other."""
+    cl.load("relief_valve").simulate(stop="1 ms", solver="rodas", compile=True)
+    assert len(list(own_cache.glob("*.so"))) > 5
+    monkeypatch.setattr(compiler.subprocess, "Popen", None)
+    result = cl.load("relief_valve").simulate(
+        stop="1 ms", solver="rodas", compile=True, parameters={"supply": "48 L/min", "line.volume": "71 cm^3"}
+    )
+    assert result.trajectory.solver == "rodas (compiled loop, compiled functions)"
+    assert not result.trajectory.warnings
+
+
+def test_what_the_cache_has_is_used_unasked(own_cache):
+    """The second process pays nothing for what the first compiled."""
+    run = circuit(components=PARTS, nets=NETS, fluid=OIL)
+    assert "interpreted" in run.simulate(1e-3, solver="rodas").trajectory.solver
+    run.simulate(1e-3, solver="rodas", compile=True)
+    again = circuit(components=PARTS, nets=NETS, fluid=OIL)
+    assert "compiled functions" in again.simulate(1e-3, solver="rodas").trajectory.solver
+    never = circuit(components=PARTS, nets=NETS, fluid=OIL)
+    assert "interpreted" in never.simulate(1e-3, solver="rodas", compile=False).trajectory.solver
+
+
+def test_a_long_run_is_compiled_beside_itself(own_cache, monkeypatch):
+    """Once compiling pays, functions change over in the middle of a run, and nobody can tell from its numbers."""
+    monkeypatch.setattr(promotion, "SECONDS", 1e-9)
+    monkeypatch.setattr("crescentlab.solvers.compiled.LOOK", 0.0)
+
+    def long_run(compile):
+        made = circuit(components=PARTS, nets=NETS, fluid=OIL)
+        return made.simulate(100.0, solver="rodas", max_step=2e-4, compile=compile).trajectory
+
+    promoted, interpreted = long_run(None), long_run(False)
+    assert promoted.solver.endswith("compiled functions)")
+    np.testing.assert_array_equal(promoted.steps.x, interpreted.steps.x)
+
+
+def test_a_run_that_ends_first_stops_its_compiler(own_cache, monkeypatch):
+    """Nobody waits for a compiler whose work is no longer needed, and it leaves nothing behind."""
+    monkeypatch.setattr(promotion, "SECONDS", 1e-9)
+    monkeypatch.setattr("crescentlab.solvers.compiled.LOOK", 0.0)
+    cl.load("crescent_pump").simulate(stop="40 ms", solver="rodas")
+    assert [path for path in own_cache.iterdir() if path.is_dir()] == []
+
+
+# -- without a compiler, or with a poor one ------------------------------------------------------
+
+
+def test_without_a_compiler_functions_are_interpreted(no_compiler):
+    """One line says so; unasked, none does."""
+    run = circuit(components=PARTS, nets=NETS, fluid=OIL)
+    (said,) = run.simulate(1e-3, solver="lsoda", compile=True).trajectory.warnings
+    assert said == "functions are interpreted: no C compiler found (cc, gcc, clang, or what CC names)"
+    assert run.simulate(1e-3, solver="lsoda").trajectory.warnings == []
+
+
+@pytest.mark.parametrize(("asked", "instead"), [("rodas", "auto (lsoda)"), ("dopri", "rk45 (rk45)")])
+def test_without_a_compiler_another_solver_runs(no_compiler, asked, instead):
+    """The notice names both, and the summary the one that ran."""
+    trajectory = circuit(components=PARTS, nets=NETS, fluid=OIL).simulate(1e-3, solver=asked).trajectory
+    assert trajectory.solver == instead
+    assert trajectory.warnings[0].startswith(f"{asked} needs a C compiler, {instead} ran instead: no C compiler found")
+
+
+def test_a_compiler_that_fails_is_quoted(own_cache):
+    """Its first error, not its whole output."""
+    with pytest.raises(CompilerError, match=r"failed: broken\.c:1.*error"):
+        compiler.build({"broken.c": "double f(void) { return }"})
+    assert list(own_cache.iterdir()) == []
+
+
+@pytest.mark.skipif(os.geteuid() == 0, reason="nothing is closed to root")
+def test_a_cache_that_cannot_be_written(tmp_path, monkeypatch):
+    """Said by name."""
+    tmp_path.chmod(stat.S_IRUSR | stat.S_IXUSR)
+    monkeypatch.setenv("CRESCENTLAB_CACHE", str(tmp_path / "inner"))
+    with pytest.raises(CompilerError, match="cannot be used"):
+        compiler.build({"fine.c": "int f(void) { return 1; }"})
+
+
+def test_a_cache_that_is_a_file(tmp_path, monkeypatch):
+    """Said by name."""
+    (tmp_path / "file").write_text("")
+    monkeypatch.setenv("CRESCENTLAB_CACHE", str(tmp_path / "file"))
+    with pytest.raises(CompilerError, match="file cannot be used"):
+        compiler.build({"fine.c": "int f(void) { return 1; }"})
+
+
+def test_the_key_is_the_content(own_cache):
+    """Other text, other flags: another library; the same: the same."""
+    one = {"one.c": "int f(void) { return 1; }"}
+    places = {
+        compiler.place(one), compiler.place({"one.c": "int f(void) { return 2; }"}), compiler.place(one, ("-O0",)),
+    }  # fmt: skip
+    assert len(places) == 3
+    assert compiler.build(one) == compiler.place(one) == compiler.build(one)
+
+
+def test_cc_names_the_compiler(monkeypatch):
+    """As make has it; a name that is no program means none."""
+    compiler.command.cache_clear()
+    monkeypatch.setenv("CC", "gcc -m64")
+    assert compiler.command() == ("gcc", "-m64")
+    compiler.command.cache_clear()
+    monkeypatch.setenv("CC", "no-such-compiler")
+    assert compiler.command() == ()
+    compiler.command.cache_clear()
+
+
+# -- who runs what -------------------------------------------------------------------------------
+
+
+class Buzz(Component):
+    """A fast oscillator: steps without end."""
+
+    omega: Ratio = Field(default=1e3, description="angular frequency")
+    x = plain("x", 1.0)
+    v = plain("v", 0.0)
+
+    def equations(self, x, v):
+        return {"der_x": self.omega * v, "der_v": -self.omega * x}
+
+
+def test_auto_hands_a_long_run_to_the_compiled_loop(monkeypatch):
+    """By a count of steps: the same run goes the same way every time; a tight tolerance stays with SciPy."""
+    monkeypatch.setattr(loop, "MANY_STEPS", 3000)
+    long = alone(Buzz).simulate(2.0, rtol=1e-5)
+    assert long.trajectory.solver.startswith("auto: rodas (compiled loop")
+    assert long["part.x"][-1] == pytest.approx(np.cos(2e3), abs=0.1)
+    assert alone(Buzz).simulate(0.2, rtol=1e-5).trajectory.solver == "auto (lsoda)"
+    assert alone(Buzz).simulate(2.0, rtol=1e-8).trajectory.solver == "auto (lsoda)"
+
+
+def test_auto_stays_with_scipy_without_a_compiler(monkeypatch, no_compiler):
+    """And says nothing: nobody asked for another."""
+    monkeypatch.setattr(loop, "MANY_STEPS", 3000)
+    trajectory = alone(Buzz).simulate(2.0, rtol=1e-5).trajectory
+    assert (trajectory.solver, trajectory.warnings) == ("auto (lsoda)", [])
+
+
+def test_every_compiled_method_has_one_to_run_instead():
+    """The names of the loop's C are those of the command line."""
+    assert set(native.METHODS) == set(integration.INSTEAD) == set(native.SHAPES)
+
+
+def test_the_loop_is_read_from_its_header():
+    """Each field once, none left out: the size is checked against the compiler's when the library is loaded."""
+    names = [name for name, _ in native.Run._fields_]
+    assert len(names) == len(set(names))
+    header = Path(loop.__file__).parent / "c" / "run.h"
+    assert header.read_text(encoding="utf-8").count(";") > len(names) > 100
+    assert ctypes.sizeof(native.Run) == 8 * len(names)
