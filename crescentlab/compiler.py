@@ -16,14 +16,17 @@ import subprocess
 import tempfile
 import threading
 from collections.abc import Mapping
+from dataclasses import dataclass
 from pathlib import Path
 
 from platformdirs import user_cache_path
 
 from crescentlab.errors import CompilerError
 
-FLAGS = ("-O1", "-std=c99", "-fPIC", "-shared", "-fno-math-errno", "-ffp-contract=off")
-"""No flag that changes a number: compiled functions give what interpreted ones give, to the last bit."""
+EXACT = ("-O1", "-std=c99", "-fPIC", "-shared", "-fno-math-errno", "-ffp-contract=off")
+"""No flag that changes a number."""
+NATIVE = ("-O2", "-std=c99", "-fPIC", "-shared", "-fno-math-errno", "-fno-semantic-interposition", "-march=native")
+"""For this machine alone."""
 CANDIDATES = ("cc", "gcc", "clang")
 
 
@@ -36,12 +39,28 @@ def command() -> tuple[str, ...]:
     return next(((name,) for name in CANDIDATES if shutil.which(name)), ())
 
 
+def require() -> None:
+    """Raise :class:`CompilerError` if the machine has no compiler."""
+    if not command():
+        raise CompilerError("no C compiler found (cc, gcc, clang, or what the variable CC names)")
+
+
 @functools.cache
 def identity() -> tuple[object, ...]:
     """What tells this compiler and this machine from others."""
     program = Path(shutil.which(command()[0]) or "").resolve()
     facts = program.stat()
-    return (*command(), str(program), facts.st_size, facts.st_mtime_ns, platform.system(), platform.machine())
+    machine = (platform.system(), platform.machine(), _abilities())
+    return (*command(), str(program), facts.st_size, facts.st_mtime_ns, *machine)
+
+
+def _abilities() -> str:
+    """What the processor can do, where the system tells: a home may be shared by several machines."""
+    try:
+        lines = Path("/proc/cpuinfo").read_text(encoding="utf-8").splitlines()
+    except OSError:
+        return platform.processor()
+    return next((line for line in lines if line.startswith(("flags", "Features"))), "")
 
 
 def cache() -> Path:
@@ -49,32 +68,37 @@ def cache() -> Path:
     return Path(os.environ.get("CRESCENTLAB_CACHE") or user_cache_path("crescentlab"))
 
 
-def place(sources: Mapping[str, str], flags: tuple[str, ...] = FLAGS) -> Path:
-    """Where the library of these sources lies once it is built."""
-    key = hashlib.sha256(repr((sorted(sources.items()), flags, identity())).encode()).hexdigest()
+@dataclass(frozen=True)
+class Source:
+    """What a library is built from: texts by file name, and flags."""
+
+    texts: Mapping[str, str]
+    flags: tuple[str, ...] = EXACT
+
+
+def place(source: Source) -> Path:
+    """Where the library of this source lies once it is built."""
+    key = hashlib.sha256(repr((sorted(source.texts.items()), source.flags, identity())).encode()).hexdigest()
     return cache() / f"{key[:32]}.so"
 
 
-def build(sources: Mapping[str, str], flags: tuple[str, ...] = FLAGS, job: Job | None = None) -> Path:
-    """The library of C sources (file name -> text), built unless the cache has it.
+def build(source: Source, job: Job | None = None) -> Path:
+    """The library of a source, built unless the cache has it.
 
     Raises :class:`CompilerError` without a compiler, if it fails, or if the cache cannot be written.
     """
-    if not command():
-        raise CompilerError("no C compiler found (cc, gcc, clang, or what the variable CC names)")
-    target = place(sources, flags)
+    require()
+    target = place(source)
     if target.is_file():
         return target
     try:
         target.parent.mkdir(parents=True, exist_ok=True)
         with tempfile.TemporaryDirectory(dir=target.parent) as folder:
-            for name, text in sources.items():
+            for name, text in source.texts.items():
                 Path(folder, name).write_text(text, encoding="utf-8")
-            units = [name for name in sources if name.endswith(".c")]
-            running = subprocess.Popen(
-                [*command(), *flags, *units, "-o", "made.so", "-lm"], cwd=folder, text=True, stdout=subprocess.DEVNULL,
-                stderr=subprocess.PIPE,
-            )  # fmt: skip
+            units = [name for name in source.texts if name.endswith(".c")]
+            called = [*command(), *source.flags, *units, "-o", "made.so", "-lm"]
+            running = subprocess.Popen(called, cwd=folder, text=True, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE)
             if job is not None:
                 job.process = running
             said = running.communicate()[1]
@@ -89,9 +113,9 @@ def build(sources: Mapping[str, str], flags: tuple[str, ...] = FLAGS, job: Job |
 class Job(threading.Thread):
     """Several libraries built one after another beside what the caller does meanwhile."""
 
-    def __init__(self, texts: Mapping[str, str]) -> None:
+    def __init__(self, sources: Mapping[str, Source]) -> None:
         super().__init__(daemon=True)
-        self.texts = texts
+        self.sources = dict(sources)
         self.libraries: dict[str, Path] = {}
         self.process: subprocess.Popen[str] | None = None
         self.cancelled = False
@@ -100,10 +124,10 @@ class Job(threading.Thread):
     def run(self) -> None:
         """Build all, unless cancelled."""
         try:
-            for name, text in self.texts.items():
+            for name, source in self.sources.items():
                 if self.cancelled:
                     return
-                self.libraries[name] = build({"function.c": text}, job=self)
+                self.libraries[name] = build(source, job=self)
         except CompilerError as error:
             self.error = error
 

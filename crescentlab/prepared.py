@@ -28,6 +28,10 @@ class Prepared:
     function: ca.Function
     parameters: ca.Function
 
+    def from_library(self, library: Path) -> Prepared:
+        """The same function out of a library built from its C."""
+        return Prepared(ca.external(self.function.name(), str(library)), self.parameters)
+
 
 CSE_LIMIT = 20_000
 """Expressions of more instructions are not searched for common parts: the search grows faster than they do."""
@@ -49,18 +53,6 @@ def prepare(name: str, arguments: list[ca.SX], p: ca.SX, outputs: list[ca.SX]) -
     q = column(symbols)
     pieces = ca.vertsplit(rest, [0, *np.cumsum(sizes).tolist()]) if rest.numel() else [ca.SX(0, 1) for _ in sizes]
     return Prepared(ca.Function(name, [*arguments, q], pieces), ca.Function("q", [p], [ca.densify(column(parametric))]))
-
-
-def c_text(prepared: Prepared) -> str:
-    """The function in C."""
-    generator = ca.CodeGenerator("function.c")
-    generator.add(prepared.function)
-    return str(generator.dump())
-
-
-def from_library(prepared: Prepared, library: Path) -> Prepared:
-    """The same function out of a library built from its :func:`c_text`: the same numbers, sooner."""
-    return Prepared(ca.external(prepared.function.name(), str(library)), prepared.parameters)
 
 
 class Evaluator:

@@ -10,9 +10,8 @@ remaps are CasADi functions; every other variable is an expression, made a funct
 from __future__ import annotations
 
 import functools
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
-from pathlib import Path
 from typing import Any
 
 import casadi as ca
@@ -23,7 +22,7 @@ from crescentlab.component import Component
 from crescentlab.domain import Held, State
 from crescentlab.elaborate import Design
 from crescentlab.errors import InputError, nearest
-from crescentlab.prepared import Prepared, c_text, from_library, prepare
+from crescentlab.prepared import Prepared, prepare
 from crescentlab.trace import numeric_fields, structure_of
 from crescentlab.units import Quantity
 
@@ -105,8 +104,8 @@ class System:
     _remap: Callable[[list[bool]], tuple[ca.SX, list[ca.SX]]]
     _contents: dict[str, tuple[Callable[[], ca.SX], Callable[[], tuple[ca.SX, ca.SX]]]]
     _functions: dict[Any, ca.Function] = field(default_factory=dict)
-    in_c: set[str] = field(default_factory=set)
-    """Names of the functions that have been compiled."""
+    built: dict[tuple[str, str], Prepared] = field(default_factory=dict)
+    """Functions that have been compiled, by name and form (see :mod:`crescentlab.solvers.promotion`)."""
 
     @property
     def arguments(self) -> list[ca.SX]:
@@ -177,15 +176,6 @@ class System:
     def _remapped(self, may_fire: list[bool]) -> Prepared:
         fired, outputs = self._remap(may_fire)
         return prepare("remap", [*self.arguments[:-1], fired], self.p, outputs)
-
-    def c_texts(self, names: Iterable[str]) -> dict[str, str]:
-        """C of the functions of these names that are not compiled yet."""
-        return {name: c_text(getattr(self, name)) for name in names if name not in self.in_c}
-
-    def adopt(self, libraries: Mapping[str, Path]) -> None:
-        """Take functions from libraries built of :meth:`c_texts`: the same numbers, sooner, whoever calls them."""
-        vars(self).update({name: from_library(getattr(self, name), path) for name, path in libraries.items()})
-        self.in_c.update(libraries)
 
     @functools.cached_property
     def period(self) -> ca.Function:

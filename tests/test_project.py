@@ -18,7 +18,7 @@ import pytest
 ROOT = Path(__file__).resolve().parents[1]
 
 LAYERS: tuple[tuple[str, ...], ...] = (
-    ("errors", "symbols", "units", "maths", "prepared"),
+    ("errors", "symbols", "units", "maths", "compiler", "c_text", "prepared"),
     ("tables", "fluid", "domain", "component"),
     ("expressions", "yaml_text", "explain", "library", "netlist"),
     ("elaborate",),

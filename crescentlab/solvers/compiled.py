@@ -128,7 +128,7 @@ class _CompiledRun:
         }
         for name in self.fields:
             outputs = new if name.startswith("remap") else None
-            evaluator = Evaluator(getattr(system, name), p, [t, x, h, b, *more.get(name, [])], outputs)
+            evaluator = Evaluator(self.promotion.take(name), p, [t, x, h, b, *more.get(name, [])], outputs)
             self.evaluators[name] = [evaluator]
             r.give(**dict(zip(OUTPUTS.get(name, ()), evaluator.outputs, strict=False)))
         self.set_addresses()
@@ -226,11 +226,11 @@ class _CompiledRun:
             restarts=r.restarts, rejected=r.rejected, factorisations=r.factorisations, wall_s=wall,
         )  # fmt: skip
         steps, pieces = self.rows(), self.pieces()
-        used = {name for name in FUNCTIONS[self.options.solver] if name in self.system.in_c}
+        functions = "compiled" if self.promotion.compiled else "interpreted"
         return Trajectory(
             steps=steps, grid=self.grid(steps, pieces) if self.options.output_step else None,
             happenings=self.happenings(), statistics=statistics, pieces=pieces,
-            solver=f"{self.options.solver} (compiled loop, {'compiled' if used else 'interpreted'} functions)",
+            solver=f"{self.options.solver} (compiled loop, {functions} functions)",
             status=status, error=error, warnings=self.warnings,
         )  # fmt: skip
 

@@ -3,20 +3,23 @@
 from __future__ import annotations
 
 import functools
+from collections.abc import Callable
 
 import numpy as np
 from scipy import sparse
 
-from crescentlab.prepared import Evaluator
+from crescentlab.prepared import Evaluator, Prepared
 from crescentlab.system import System, Values
 
 
 class Functions:
     """f and its Jacobian of one run, with the current held values and bits."""
 
-    def __init__(self, system: System, values: Values) -> None:
+    def __init__(self, system: System, values: Values, take: Callable[[str], Prepared] | None = None) -> None:
+        """``take`` gives the functions their form; without it they are interpreted."""
+        self.take = take or functools.partial(getattr, system)
         self.n = values.x0.size
-        self.f = Evaluator(system.rhs, values.p)
+        self.f = Evaluator(self.take("rhs"), values.p)
         self.system, self.values = system, values
         self.h = values.h0
         self.b = np.zeros(system.b.numel())
@@ -38,7 +41,7 @@ class Functions:
     @functools.cached_property
     def jacobian(self) -> Evaluator:
         """Nonzeros of the Jacobian in column order."""
-        return Evaluator(self.system.jacobian, self.values.p)
+        return Evaluator(self.take("jacobian"), self.values.p)
 
     @property
     def uses_jacobian(self) -> bool:

@@ -8,13 +8,15 @@ just before the round, and the bits settle again.
 
 from __future__ import annotations
 
+import functools
 from collections import deque
+from collections.abc import Callable
 from typing import NoReturn
 
 import numpy as np
 
 from crescentlab.errors import SimulationError
-from crescentlab.prepared import Evaluator
+from crescentlab.prepared import Evaluator, Prepared
 from crescentlab.system import System, Values
 from crescentlab.units import DISPLAY
 
@@ -31,15 +33,19 @@ SCAN_CHUNKS, SCAN_POINTS = 40, 501
 class Hybrid:
     """Bits, held values and conditions of one run."""
 
-    def __init__(self, system: System, values: Values, start: float, stop: float) -> None:
+    def __init__(
+        self, system: System, values: Values, start: float, stop: float, take: Callable[[str], Prepared] | None = None
+    ) -> None:
+        """``take`` gives the functions their form; without it they are interpreted."""
+        self.take = take or functools.partial(getattr, system)
         self.system = system
         self.start, self.end = start, stop
         self.span = stop - start
         self.bits_info = system.bits
-        self.f = Evaluator(system.rhs, values.p)
-        self._relation = Evaluator(system.relation, values.p)
-        self._watched = Evaluator(system.relation_on_state, values.p)
-        self.condition = Evaluator(system.condition, values.p)
+        self.f = Evaluator(self.take("rhs"), values.p)
+        self._relation = Evaluator(self.take("relation"), values.p)
+        self._watched = Evaluator(self.take("relation_on_state"), values.p)
+        self.condition = Evaluator(self.take("condition"), values.p)
         self.n = len(system.bits.names)
         self.b = np.zeros(self.n)
         self.h = values.h0.copy()
@@ -65,7 +71,7 @@ class Hybrid:
         """What sets states and held values when ticks, events, or both fire."""
         name = "remap" if ticks and events else "remap_ticks" if ticks else "remap_events"
         if name not in self.remaps:
-            self.remaps[name] = Evaluator(getattr(self.system, name), self.p)
+            self.remaps[name] = Evaluator(self.take(name), self.p)
         return self.remaps[name]
 
     def evaluators(self) -> dict[str, Evaluator]:

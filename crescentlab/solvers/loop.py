@@ -67,8 +67,8 @@ class _Run:
         self.system, self.values, self.options, self.progress = system, values, options, progress
         self.promotion = Promotion(system, functions_of(options.solver), options.compile, SAVING)
         self.warnings = [notice] if (notice := self.promotion.before()) else []
-        self.functions = Functions(system, values)
-        self.hybrid = Hybrid(system, values, options.start, options.stop)
+        self.functions = Functions(system, values, self.promotion.take)
+        self.hybrid = Hybrid(system, values, options.start, options.stop, self.promotion.take)
         self.roots = RootFinder(self.hybrid)
         self.atol = options.rtol * system.nominal
         self.diagnosis = Diagnosis(self.functions, options.rtol, self.atol)

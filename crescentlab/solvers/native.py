@@ -15,11 +15,11 @@ from typing import Any
 import casadi  # noqa: F401  # loads the library looked into below
 import numpy as np
 
-from crescentlab.compiler import FLAGS, build
+from crescentlab.compiler import EXACT, Source, build
 from crescentlab.errors import CompilerError
 
 SOURCES = ("run.h", "loop.c", "lu.c", "rodas.c", "dopri.c")
-OPTIMISED = ("-O2", *FLAGS[1:])
+OPTIMISED = ("-O2", *EXACT[1:])
 ROWS_BYTES = 8_000_000
 """About how much is recorded before Python empties the records."""
 CALL_FUNCTION = "_ZN6casadi21_function_buffer_evalEPv"
@@ -81,7 +81,7 @@ class Run(ctypes.Structure):
 @functools.cache
 def library() -> ctypes.CDLL:
     """The compiled loop; raises :class:`CompilerError` on a machine that cannot build it."""
-    found = ctypes.CDLL(str(build({name: source(name) for name in SOURCES}, OPTIMISED)))
+    found = ctypes.CDLL(str(build(Source({name: source(name) for name in SOURCES}, OPTIMISED))))
     found.size_of_run.restype = ctypes.c_int64
     if found.size_of_run() != ctypes.sizeof(Run):
         raise CompilerError("the compiled loop does not fit this machine's compiler")

@@ -1,7 +1,8 @@
-"""Functions of a run compiled before it, or beside it when it turns out to be long.
+"""Which form of the system's functions a run calls: interpreted, or C compiled before it or beside it.
 
-Compiled functions give what interpreted ones give to the last bit, so that nobody can tell from a result when they took
-over.
+Beside a run, and out of the cache unasked, functions are compiled exactly as CasADi writes them: they give what
+interpreted ones give to the last bit, so that nobody can tell from a result when they took over. Asked for, they are
+compiled for this machine with their slow operations in vectors, which moves last digits and is about twice as fast.
 """
 
 from __future__ import annotations
@@ -12,8 +13,9 @@ from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 from crescentlab import compiler
+from crescentlab.c_text import c_text, wide_sources
 from crescentlab.errors import CompilerError
-from crescentlab.prepared import Evaluator
+from crescentlab.prepared import Evaluator, Prepared
 from crescentlab.system import System
 
 LARGEST = 100_000
@@ -23,74 +25,87 @@ SECONDS = 4e-4
 
 
 class Promotion:
-    """The functions of one run on their way from interpreted to compiled."""
+    """The functions of one run, on their way from interpreted to compiled."""
 
     def __init__(self, system: System, names: Iterable[str], wanted: bool | None, saving: float) -> None:
         """``wanted``: True before the run, False never, None when it pays; ``saving``: share of the run it saves."""
         self.system, self.wanted, self.saving = system, wanted, saving
-        self.names = [name for name in names if name not in system.in_c]
+        self.form = "wide" if wanted else "exact"
+        self.names = tuple(names)
         self.job: compiler.Job | None = None
-        self.texts: dict[str, str] = {}
+        self.sources: dict[str, compiler.Source] = {}
+        """What is not compiled yet, and might be."""
+
+    def take(self, name: str) -> Prepared:
+        """The function of this name in the form it has now."""
+        interpreted: Prepared = getattr(self.system, name)
+        return interpreted if self.wanted is False else self.system.built.get((name, self.form), interpreted)
+
+    @property
+    def compiled(self) -> bool:
+        """Whether any function is compiled."""
+        return self.wanted is not False and any((name, self.form) in self.system.built for name in self.names)
 
     def before(self) -> str | None:
         """Compile what is wanted, or take what the cache has; a notice if that is not possible."""
-        if self.wanted is False or not self.names:
+        missing = [name for name in self.names if (name, self.form) not in self.system.built]
+        if self.wanted is False or not missing:
             return None
-        if not compiler.command():
-            return (
-                "functions are interpreted: no C compiler found (cc, gcc, clang, or what CC names)"
-                if self.wanted
-                else None
-            )
-        size = max(getattr(self.system, name).function.n_instructions() for name in self.names)
-        if size > LARGEST:
-            self.names = []
-            return f"functions are interpreted: {size} instructions are too many to compile" if self.wanted else None
-        self.texts = self.system.c_texts(self.names)
         try:
+            compiler.require()
+            size = max(getattr(self.system, name).function.n_instructions() for name in missing)
+            if size > LARGEST:
+                raise CompilerError(f"one has {size} instructions, more than the {LARGEST} that a compiler takes well")
+            self.sources = {name: self.source(name) for name in missing}
             if self.wanted:
                 with ThreadPoolExecutor(max_workers=os.cpu_count()) as pool:
-                    paths = list(pool.map(lambda text: compiler.build({"function.c": text}), self.texts.values()))
-                self.adopt(dict(zip(self.texts, paths, strict=True)))
+                    libraries = pool.map(compiler.build, self.sources.values())
+                    self.adopt(dict(zip(tuple(self.sources), libraries, strict=True)))
             else:
-                known = {name: compiler.place({"function.c": text}) for name, text in self.texts.items()}
+                known = {name: compiler.place(source) for name, source in self.sources.items()}
                 self.adopt({name: path for name, path in known.items() if path.is_file()})
         except CompilerError as error:
-            self.names = []
-            return f"functions are interpreted: {error}"
+            self.sources = {}
+            return f"functions are interpreted: {error}" if self.wanted else None
         return None
 
+    def source(self, name: str) -> compiler.Source:
+        """C of a function."""
+        function = getattr(self.system, name).function
+        if self.form == "wide":
+            return compiler.Source(wide_sources(function), compiler.NATIVE)
+        return compiler.Source({"function.c": c_text(function)})
+
     def adopt(self, libraries: dict[str, Path]) -> None:
-        self.system.adopt(libraries)
-        self.names = [name for name in self.names if name not in libraries]
-        for name in libraries:
-            self.texts.pop(name)
+        """Call functions out of libraries from now on, in this run and later ones of its kind."""
+        for name, path in libraries.items():
+            self.system.built[name, self.form] = getattr(self.system, name).from_library(path)
+            self.sources.pop(name)
 
     @property
     def seconds(self) -> float:
         """About how long compiling what is left would take."""
-        counts = [int(getattr(self.system, name).function.n_instructions()) for name in self.names]
+        counts = [int(getattr(self.system, name).function.n_instructions()) for name in self.sources]
         return SECONDS * sum(counts)
 
     def look(self, elapsed: float, share: float, evaluators: dict[str, list[Evaluator]]) -> bool:
         """See beside a run whether compiling pays or is done; whether functions have just been replaced."""
-        if self.wanted is not None or not self.texts:
+        if self.wanted is not None or not self.sources:
             return False
         if self.job is None:
             left = elapsed * (1 - share) / share if share > 0 else 0.0
             if self.saving * (left - self.seconds) > self.seconds:
-                self.job = compiler.Job(self.texts)
+                self.job = compiler.Job(self.sources)
                 self.job.start()
             return False
         if self.job.is_alive():
             return False
-        libraries = self.job.libraries
-        if self.job.error is not None:
-            self.texts = {}
-        self.adopt(dict(libraries))
+        libraries = dict(self.job.libraries)
+        self.adopt(libraries)
+        self.sources = {}
         for name in libraries:
             for evaluator in evaluators.get(name, []):
-                evaluator.use(getattr(self.system, name).function)
+                evaluator.use(self.take(name).function)
         return bool(libraries)
 
     def end(self) -> None:
