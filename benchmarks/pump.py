@@ -19,6 +19,7 @@ import time
 from pathlib import Path
 
 import casadi as ca
+import chains
 import numpy as np
 
 import crescentlab as cl
@@ -47,19 +48,6 @@ def assembly_seconds(netlist: Netlist) -> float:
         assemble(plan(build(elaborate(netlist, library)), library))
         found.append(time.perf_counter() - begun)
     return min(found)
-
-
-def chain(n: int) -> Netlist:
-    """n volumes and n orifices one after another, draining into a tank."""
-    components: dict[str, dict[str, str]] = {"tank": {"type": "tank"}}
-    nets: dict[str, list[str]] = {}
-    for k in range(n):
-        components[f"v{k}"] = {"type": "capacity", "volume": "70 cm^3"}
-        components[f"o{k}"] = {"type": "orifice", "area": "2 mm^2"}
-        nets[f"n{k}"] = [f"v{k}.port", f"o{k}.a"] + ([f"o{k - 1}.b"] if k else [])
-    nets["out"] = [f"o{n - 1}.b", "tank.port"]
-    fluid = {"type": "simple_oil", "density": "860 kg/m^3", "kinematic_viscosity": "35 cSt", "bulk_modulus": "1.4 GPa"}
-    return Netlist.of({"crescentlab": 1, "fluid": fluid, "components": components, "nets": nets}, "chain")
 
 
 def compiled(circuit: Circuit, folder: Path) -> Circuit | None:
@@ -122,7 +110,7 @@ def main() -> None:
 
     pump = cl.load("crescent_pump")
     print(f"assembly of crescent_pump          {assembly_seconds(pump.netlist):.3f} s")
-    print(f"assembly of 1000 orifices, volumes {assembly_seconds(chain(1000)):.3f} s")
+    print(f"assembly of 1000 orifices, volumes {assembly_seconds(chains.netlist('chain', 1000)):.3f} s")
 
     system = pump.system()
     print(

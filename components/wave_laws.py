@@ -20,8 +20,8 @@ NEWTON_STEPS = 6
 """Newton steps from density to pressure: rounding remains above 0 bar, 1 Pa after a fall from 1 to -0.9 bar."""
 
 HALF_STEPS, FULL_STEPS = 3, 4
-"""Newton steps within a tick. Waves of 0.5 bar per node are exact to 1e-3 Pa in the half step, which moves momentum alone;
-the full step, which must keep mass, begins so close that rounding remains."""
+"""Newton steps within a tick. Waves of 0.5 bar per node are exact to 1e-3 Pa in the half step, which moves momentum
+alone; the full step, which must keep mass, begins so close that rounding remains."""
 
 Friction = Callable[[Any, Any], Any]
 """Pressure gradient g(q, p) [Pa/m] of steady friction."""

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from collections import deque
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, NamedTuple
 
 import networkx as nx
 
@@ -35,8 +35,7 @@ class Source:
     sign: float
 
 
-@dataclass(frozen=True)
-class Step:
+class Step(NamedTuple):
     """Evaluate one group of one instance's port outputs."""
 
     instance: str
@@ -54,7 +53,8 @@ class Plan:
     fluids: dict[str, tuple[str, ...]]
     """Per instance, the circuit's fluid for each fluid its equations ask for."""
     sources: dict[str, tuple[Source, ...]]
-    order: tuple[Step, ...]
+    order: tuple[tuple[Step, ...], ...]
+    """Waves of steps: each needs only what the waves before it give."""
     givers: dict[str, Member | None] = field(default_factory=dict)
 
 
@@ -161,6 +161,8 @@ def _fluids(graph: Graph, components: dict[str, Component], library: Library) ->
     """The fluid of every fluid argument, spread over nets from those that name one."""
     design = graph.design
     of_net = _fluid_of_nets(graph, components)
+    if len(design.fluids) == 1:
+        return {name: tuple(design.fluids) * len(fluids_asked(type(c))) for name, c in components.items()}
     nets_of: dict[tuple[str, str], list[str]] = {}
     for net in graph.nets:
         for m in net.members:
@@ -175,8 +177,6 @@ def _fluids(graph: Graph, components: dict[str, Component], library: Library) ->
                 for n in nets_of.get((name, p), [])
                 if n in of_net
             ]
-            if not found and len(design.fluids) == 1:
-                found = list(design.fluids)
             if not found:
                 if not design.fluids:
                     raise InputError(
@@ -304,7 +304,9 @@ def _sources(
     return {name: tuple(sources) for name, sources in found.items()}
 
 
-def _order(graph: Graph, traces: dict[str, Trace], sources: dict[str, tuple[Source, ...]]) -> tuple[Step, ...]:
+def _order(
+    graph: Graph, traces: dict[str, Trace], sources: dict[str, tuple[Source, ...]]
+) -> tuple[tuple[Step, ...], ...]:
     group_of: dict[Variable, Step] = {}
     for name, tr in traces.items():
         for g, group in enumerate(tr.groups):
@@ -315,23 +317,24 @@ def _order(graph: Graph, traces: dict[str, Trace], sources: dict[str, tuple[Sour
     for name, tr in traces.items():
         for g, group in enumerate(tr.groups):
             after[Step(name, g)] = {group_of[v] for i in group.inputs for v in sources[name][i].outputs}
-    order: list[Step] = []
     waiting = {step: len(need) for step, need in after.items()}
     followers: dict[Step, list[Step]] = {}
     for step, need in after.items():
         for before in need:
             followers.setdefault(before, []).append(step)
-    ready = deque(step for step, n in waiting.items() if n == 0)
+    waves: list[tuple[Step, ...]] = []
+    ready = [step for step, n in waiting.items() if n == 0]
     while ready:
-        step = ready.popleft()
-        order.append(step)
-        for follower in followers.get(step, []):
+        waves.append(tuple(ready))
+        freed = [follower for step in ready for follower in followers.get(step, ())]
+        ready = []
+        for follower in freed:
             waiting[follower] -= 1
             if waiting[follower] == 0:
                 ready.append(follower)
-    if len(order) < len(after):
+    if any(waiting.values()):
         raise _loop(graph, traces, {s: after[s] for s, n in waiting.items() if n > 0})
-    return tuple(order)
+    return tuple(waves)
 
 
 def _loop(graph: Graph, traces: dict[str, Trace], after: dict[Step, set[Step]]) -> CausalityError:
@@ -340,14 +343,16 @@ def _loop(graph: Graph, traces: dict[str, Trace], after: dict[Step, set[Step]]) 
     edges = [(rank[before], rank[step]) for step, need in after.items() for before in need if before in rank]
     found = [edge[0] for edge in nx.find_cycle(nx.DiGraph(sorted(edges)))]
     first = found.index(min(found))
-    cycle = [list(after)[k] for k in found[first:] + found[:first]]
+    steps = list(after)
+    cycle = [steps[k] for k in found[first:] + found[:first]]
     names: list[str] = []
     for step in cycle:
         layout = traces[step.instance].outputs
         k = traces[step.instance].groups[step.group].outputs[0]
         names.append(next(f"{step.instance}.{n}" for n, _ in layout.slots if k in layout.indices(n)))
     place = graph.design.instances[cycle[0].instance].place
-    domains = {m.port.domain for net in graph.nets for m in net.members if m.instance in {s.instance for s in cycle}}
+    instances = {step.instance for step in cycle}
+    domains = {m.port.domain for net in graph.nets for m in net.members if m.instance in instances}
     advice = (
         "insert a capacity or a mass on the way"
         if domains - {SIGNAL}

@@ -136,6 +136,7 @@ class _Elaboration:
         self.outputs: list[Output] = []
         self.parameters: dict[str, dict[str, Value]] = {}
         self.parts: dict[str, Netlist] = {}
+        self.made: dict[Any, Any] = {}
 
     def with_user_files(self, netlist: Netlist, library: Library) -> Library:
         for k, text in enumerate(netlist.sections.library):
@@ -159,9 +160,7 @@ class _Elaboration:
             if "type" not in node.value:
                 raise InputError("the fluid needs a type, for example fluid: {type: simple_oil}", node.place)
             cls = library.fluid(str(node.value["type"].value), node.place_of("type"))
-            made[name] = _instance(
-                cls, node, _scope_lookup(values, netlist), overrides, name, netlist.folder, {"type"}, name
-            )
+            made[name] = self.instance(cls, node, _scope_lookup(values, netlist), overrides, name, netlist.folder)
         return made
 
     def scope(
@@ -209,7 +208,7 @@ class _Elaboration:
         overrides: _Overrides,
     ) -> None:
         lookup = _scope_lookup(values, netlist)
-        instance = _instance(cls, node, lookup, overrides, full, netlist.folder, {"type", "start"}, full)
+        instance = self.instance(cls, node, lookup, overrides, full, netlist.folder)
         try:
             for declared in [*cls.ports(), *cls.declared(State), *cls.declared(Held), *cls.declared(Observable)]:
                 instance.size_of(declared.size)
@@ -233,6 +232,38 @@ class _Elaboration:
                 subject = f"{'--set ' if text is not None else ''}{full}.start.{name}"
                 start[name] = np.array([_number(str(i.value), quantity, lookup, subject, i.place) for i in items])
         self.instances[full] = Instance(full, instance, node.place, start)
+
+    def instance(self, cls: type[Any], node: Node, lookup: Any, overrides: _Overrides, full: str, folder: Path) -> Any:
+        """Validate a component or fluid; expressions become numbers first, ``--set`` texts replace.
+
+        Those of equal values are one object: a large circuit has few kinds of parts.
+        """
+        assert isinstance(node.value, dict)
+        data: dict[str, Any] = {}
+        kept = {"type", "start"} if issubclass(cls, Component) else {"type"}
+        given = {name: child for name, child in node.value.items() if name not in kept}
+        from_command: set[str] = set()
+        fields = {info.alias or name: info for name, info in cls.model_fields.items()}
+        for name in fields:
+            text = overrides.take(f"{full}.{name}")
+            if text is not None:
+                given[name] = Node(text, COMMAND)
+                from_command.add(name)
+        for name, child in given.items():
+            info = fields.get(name)
+            where = f"--set {full}.{name}" if name in from_command else f"{full}.{name}"
+            data[name] = _plain(child, info, lookup, where) if info is not None else child.plain()
+        key = cls, folder, repr(data)
+        if key in self.made:
+            return self.made[key]
+        try:
+            made = validated(cls, node, data, context={"folder": str(folder)}, subject=full)
+        except InputError as error:
+            if any(re.match(rf"{re.escape(f'{full}.{name}')}\b", error.message) for name in from_command):
+                raise type(error)(f"--set {error.message}") from None
+            raise
+        self.made[key] = made
+        return made
 
     def subcircuit(
         self, netlist: Netlist, file: str, node: Node, full: str, values: dict[str, Value], library: Library,
@@ -298,7 +329,7 @@ class _Elaboration:
     ) -> None:
         base = ("nets", name, "ports") if isinstance(section, NetSection) else ("nets", name)
         net = DesignNet(prefix + name, netlist.place("nets", name))
-        net.open = name in netlist.sections.ports.values() and prefix == ""
+        net.open = prefix == "" and name in netlist.sections.ports.values()
         if isinstance(section, NetSection):
             net.fluid = section.fluid
         self.nets[net.name] = net
@@ -334,6 +365,7 @@ class _Elaboration:
     def joined_nets(self) -> list[DesignNet]:
         """Nets with those of subcircuits merged into the outermost net they meet."""
         parent = {name: name for name in self.nets}
+        rank = {name: (name.count("."), k) for k, name in enumerate(self.nets)}
 
         def root(name: str) -> str:
             while parent[name] != name:
@@ -344,7 +376,7 @@ class _Elaboration:
         for outer, inner in self.joins:
             a, b = root(outer), root(inner)
             if a != b:
-                keep, drop = sorted((a, b), key=lambda n: (n.count("."), list(self.nets).index(n)))
+                keep, drop = sorted((a, b), key=rank.__getitem__)
                 parent[drop] = keep
         for name, net in self.nets.items():
             kept = self.nets[root(name)]
@@ -437,39 +469,6 @@ def _number(text: str, quantity: Any, lookup: Any, subject: str, place: Place | 
         return float(quantity.parse(text))
     except InputError as error:
         raise _described(error, subject, place) from None
-
-
-def _instance(
-    cls: type[Any],
-    node: Node,
-    lookup: Any,
-    overrides: _Overrides,
-    full: str,
-    folder: Path,
-    skip: set[str],
-    subject: str,
-) -> Any:
-    """Validate a component or fluid; expressions become numbers first, ``--set`` texts replace."""
-    assert isinstance(node.value, dict)
-    data: dict[str, Any] = {}
-    given = {name: child for name, child in node.value.items() if name not in skip}
-    from_command: set[str] = set()
-    fields = {info.alias or name: info for name, info in cls.model_fields.items()}
-    for name in fields:
-        text = overrides.take(f"{full}.{name}")
-        if text is not None:
-            given[name] = Node(text, COMMAND)
-            from_command.add(name)
-    for name, child in given.items():
-        info = fields.get(name)
-        where = f"--set {full}.{name}" if name in from_command else f"{subject}.{name}"
-        data[name] = _plain(child, info, lookup, where) if info is not None else child.plain()
-    try:
-        return validated(cls, node, data, context={"folder": str(folder)}, subject=subject)
-    except InputError as error:
-        if any(re.match(rf"{re.escape(f'{subject}.{name}')}\b", error.message) for name in from_command):
-            raise type(error)(f"--set {error.message}") from None
-        raise
 
 
 def _plain(node: Node, info: Any, lookup: Any, subject: str) -> Any:

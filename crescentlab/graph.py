@@ -7,6 +7,7 @@ used twice, domains mixed, sizes or units that differ.
 
 from __future__ import annotations
 
+import functools
 from dataclasses import dataclass, field
 
 import networkx as nx
@@ -51,7 +52,17 @@ class Graph:
 
     design: Design
     nets: list[Net]
-    graph: nx.MultiGraph[tuple[str, str]]
+
+    @functools.cached_property
+    def graph(self) -> nx.MultiGraph[tuple[str, str]]:
+        """Components and nets as nodes, port elements as edges."""
+        graph: nx.MultiGraph[tuple[str, str]] = nx.MultiGraph()
+        graph.add_nodes_from((("component", name) for name in self.design.instances), bipartite=0)
+        graph.add_nodes_from((("net", net.name) for net in self.nets), bipartite=1)
+        graph.add_edges_from(
+            (("component", m.instance), ("net", net.name), {"member": m}) for net in self.nets for m in net.members
+        )
+        return graph
 
     def quantity(self, member: Member) -> Quantity:
         """The quantity a signal port carries."""
@@ -61,13 +72,7 @@ class Graph:
 def build(design: Design) -> Graph:
     """Unroll vector ports and check every net; raises :class:`InputError` naming the port."""
     nets = [net for source in design.nets for net in _unrolled(design, source)]
-    graph: nx.MultiGraph[tuple[str, str]] = nx.MultiGraph()
-    graph.add_nodes_from((("component", name) for name in design.instances), bipartite=0)
-    graph.add_nodes_from((("net", net.name) for net in nets), bipartite=1)
-    graph.add_edges_from(
-        (("component", m.instance), ("net", net.name), {"member": m}) for net in nets for m in net.members
-    )
-    result = Graph(design, nets, graph)
+    result = Graph(design, nets)
     _check_connections(result)
     for net in nets:
         _check_net(result, net)

@@ -33,26 +33,61 @@ class Prepared:
         return Prepared(ca.external(self.function.name(), str(library)), self.parameters)
 
 
-CSE_LIMIT = 20_000
-"""Expressions of more instructions are not searched for common parts: the search grows faster than they do."""
+SMALL = 20_000
+"""Expressions of more instructions are not searched for common parts, which would take longer than all else."""
+
+
+def is_small(expression: ca.SX) -> bool:
+    """Whether an expression is small enough to be searched."""
+    return expression.nnz() <= SMALL and int(ca.n_nodes(expression)) <= SMALL
 
 
 def shared(expression: ca.SX) -> ca.SX:
     """``expression`` with common subexpressions computed once, if it is small enough to search."""
-    free = ca.symvar(expression)
-    if not expression.numel() or ca.Function("count", [ca.vertcat(*free)], [expression]).n_instructions() > CSE_LIMIT:
-        return expression
-    return ca.cse(expression)
+    return ca.cse(expression) if expression.numel() and is_small(expression) else expression
 
 
-def prepare(name: str, arguments: list[ca.SX], p: ca.SX, outputs: list[ca.SX]) -> Prepared:
-    """Share common subexpressions of the outputs and hoist what depends on ``p`` alone."""
+def prepare(name: str, arguments: list[ca.SX], p: ca.SX, outputs: list[ca.SX], *, seldom: bool = False) -> Prepared:
+    """Share common subexpressions of the outputs and hoist what depends on ``p`` alone.
+
+    Hoisting saves a tenth of an evaluation: what is large and evaluated ``seldom`` does without.
+    """
     sizes = [o.numel() for o in outputs]
     common = shared(ca.densify(column(outputs)))
-    rest, symbols, parametric = ca.extract_parametric(common, p, {"extract_trivial": True})
-    q = column(symbols)
+    if seldom and not is_small(common):
+        rest, q, values = common, p, p
+    else:
+        rest, symbols, parametric = ca.extract_parametric(common, p, {"extract_trivial": True})
+        q, values = column(symbols), column(parametric)
     pieces = ca.vertsplit(rest, [0, *np.cumsum(sizes).tolist()]) if rest.numel() else [ca.SX(0, 1) for _ in sizes]
-    return Prepared(ca.Function(name, [*arguments, q], pieces), ca.Function("q", [p], [ca.densify(column(parametric))]))
+    return Prepared(ca.Function(name, [*arguments, q], pieces), ca.Function("q", [p], [ca.densify(values)]))
+
+
+WIDE = 50
+"""Rows of more nonzeros are differentiated one by one."""
+
+
+def jacobian(f: ca.SX, x: ca.SX) -> ca.SX:
+    """df/dx, sparse, in time proportional to the size of ``f``.
+
+    CasADi sweeps over all of f as often as its widest row has nonzeros: n times for n volumes around one. Such rows
+    are taken out and need one backward sweep over their own part of f.
+    """
+    if x.numel() <= WIDE:
+        return ca.jacobian(f, x)
+    pattern = ca.jacobian_sparsity(f, x)
+    counts = np.bincount(np.array(pattern.row(), dtype=int), minlength=f.numel())
+    if not (counts > WIDE).any():
+        return ca.jacobian(f, x)
+    narrow, wide = np.flatnonzero(counts <= WIDE).tolist(), np.flatnonzero(counts > WIDE).tolist()
+    across = pattern.T
+    start, places = across.colind(), across.row()
+    parts = [ca.jacobian(f[narrow], x)]
+    for row in wide:
+        columns = places[start[row] : start[row + 1]]
+        part = ca.jacobian(f[row], x[columns])
+        parts.append(ca.SX(ca.Sparsity.triplet(1, x.numel(), [0] * len(columns), columns), ca.densify(part).nz[:]))
+    return ca.vertcat(*parts)[np.argsort(narrow + wide).tolist(), :]
 
 
 class Evaluator:

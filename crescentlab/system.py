@@ -22,7 +22,7 @@ from crescentlab.component import Component
 from crescentlab.domain import Held, State
 from crescentlab.elaborate import Design
 from crescentlab.errors import InputError, nearest
-from crescentlab.prepared import Prepared, prepare
+from crescentlab.prepared import Prepared, jacobian, prepare
 from crescentlab.trace import numeric_fields, structure_of
 from crescentlab.units import Quantity
 
@@ -125,12 +125,12 @@ class System:
     @functools.cached_property
     def jacobian_expression(self) -> ca.SX:
         """df/dx, sparse (n, n)."""
-        return ca.jacobian(self.f, self.x)
+        return jacobian(self.f, self.x)
 
     @functools.cached_property
     def jacobian(self) -> Prepared:
         """Nonzeros of df/dx in column order."""
-        return prepare("dfdx", self.arguments[:-1], self.p, [self.jacobian_expression.nz[:]])
+        return prepare("dfdx", self.arguments[:-1], self.p, [self.jacobian_expression.nz[:]], seldom=True)
 
     @functools.cached_property
     def linear(self) -> Prepared:

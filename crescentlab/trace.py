@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import functools
 import string
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -54,6 +54,12 @@ class Layout:
         """Places of a name's elements."""
         at, n = self.offsets[name]
         return range(at, at + (1 if n is None else n))
+
+    def places(self, names: Iterable[str], within: Sequence[int] | None = None) -> list[int]:
+        """Places of several names' elements, name by name; ``within`` picks the same few of each."""
+        if within is None:
+            return [k for name in names for k in self.indices(name)]
+        return [self.offsets[name][0] + k for name in names for k in within]
 
     def cut(self, vector: ca.SX) -> dict[str, Sym]:
         """The vector's parts as symbols by name."""

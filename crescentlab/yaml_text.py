@@ -220,16 +220,18 @@ class _Builder:
         self.flow = 0  # how many of the innermost nodes on the stack are written in {} or []
         self.root: Node | None = None
         self.aliased = 0
+        self.here = Place(name, 0)
+        """The place of the last event, shared by all of its line."""
 
     def build(self, text: str) -> Node:
         documents = 0
         for event in yaml.parse(text, Loader=_Loader):
-            if isinstance(event, yaml.DocumentStartEvent):
+            if isinstance(event, yaml.ScalarEvent):
+                self.add(Node(event.value, self.place(event)), event.anchor, event)
+            elif isinstance(event, yaml.DocumentStartEvent):
                 documents += 1
                 if documents > 1:
                     raise InputError("the file holds two YAML documents; keep one", self.place(event))
-            elif isinstance(event, yaml.ScalarEvent):
-                self.add(Node(event.value, self.place(event)), event.anchor, event)
             elif isinstance(event, yaml.AliasEvent):
                 if event.anchor not in self.anchors:
                     raise InputError(
@@ -258,7 +260,10 @@ class _Builder:
         return opened is not None and opened.line < self.place(event).line
 
     def place(self, event: Any) -> Place:
-        return Place(self.name, event.start_mark.line + 1)
+        line = event.start_mark.line + 1
+        if line != self.here.line:
+            self.here = Place(self.name, line)
+        return self.here
 
     def add(self, node: Node, anchor: str | None, event: Any) -> None:
         if isinstance(event, yaml.AliasEvent):
@@ -287,18 +292,10 @@ class _Builder:
         parent.size = min(parent.size + node.size, MAX_ALIASED + 1)
 
     def key(self, parent: Node, node: Node, event: Any) -> str:
-        line = _line(self.lines, self.place(event).line)
-        if not isinstance(node.value, str):
-            better = quoted(line, self.continued(event))
-            raise InputError(
-                f"{MUST_QUOTE}: {_cut(better)}" if better != line else f"a key must be a word; look at: {_cut(line)}",
-                self.place(event),
-            )
-        if not event.style and (bracket := re.match(r"([\w.]+)\s+[\[{]", node.value)):
-            better = line.replace(bracket[1], f"{bracket[1]}:", 1)
-            raise InputError(f"a colon is missing before the bracket; write: {_cut(better)}", node.place)
-        if not event.style and (glued := re.match(r"([A-Za-z_][\w.]*):(\S.*)", node.value)):
-            raise InputError(f"a blank is missing after the colon; write: {glued[1]}: {_cut(glued[2])}", node.place)
+        plain = isinstance(event, yaml.ScalarEvent) and not event.style
+        if not isinstance(node.value, str) or (plain and not node.value.isidentifier()):
+            self.check_key(node, event)
+        assert isinstance(node.value, str)
         if node.value in parent.keys:
             first = parent.keys[node.value]
             raise InputError(
@@ -307,6 +304,21 @@ class _Builder:
             )
         parent.keys[node.value] = node.place
         return node.value
+
+    def check_key(self, node: Node, event: Any) -> None:
+        """Refuse a key that is no text, or text in which a blank or a colon is missing."""
+        line = _line(self.lines, self.place(event).line)
+        if not isinstance(node.value, str):
+            better = quoted(line, self.continued(event))
+            raise InputError(
+                f"{MUST_QUOTE}: {_cut(better)}" if better != line else f"a key must be a word; look at: {_cut(line)}",
+                self.place(event),
+            )
+        if bracket := re.match(r"([\w.]+)\s+[\[{]", node.value):
+            better = line.replace(bracket[1], f"{bracket[1]}:", 1)
+            raise InputError(f"a colon is missing before the bracket; write: {_cut(better)}", node.place)
+        if glued := re.match(r"([A-Za-z_][\w.]*):(\S.*)", node.value):
+            raise InputError(f"a blank is missing after the colon; write: {glued[1]}: {_cut(glued[2])}", node.place)
 
     def no_value(self, parent: dict[str, Node], key: str, event: Any) -> None:
         """Refuse a key without a value inside ``{}``: mostly the rest of a text that holds a comma."""

@@ -108,6 +108,10 @@ def test_anchors_that_explode(refused: Refusal, form: str) -> None:
     assert re.match(rf"c.yaml:\d+: aliases .* more than {MAX_ALIASED} values; write them out", said)
 
 
+def test_an_alias_may_be_a_key() -> None:
+    assert parse("a: &name b\n*name : c\n", "c.yaml").plain() == {"a": "b", "b": "c"}
+
+
 SLIPS = [
     (HOLE, "{type: orifice, area: = max(1 mm^2, 5 mm^2)}", "{type: orifice, area: '= max(1 mm^2, 5 mm^2)'}"),
     (
