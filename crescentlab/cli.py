@@ -150,7 +150,7 @@ def _parser() -> tuple[argparse.ArgumentParser, dict[str, argparse.ArgumentParse
 
 def _simulate(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--stop", metavar="T", help="end time, for example '50 ms'")
-    parser.add_argument("--solver", metavar="NAME", help="auto, lsoda, bdf, radau, rk45 or dop853")
+    parser.add_argument("--solver", metavar="NAME", help="auto, lsoda, bdf, radau, rk45, dop853 or cvode")
     parser.add_argument("--rtol", metavar="R", type=_number, help="relative tolerance of every state")
     parser.add_argument("--output-step", metavar="DT", help="uniform output grid, for example '0.1 ms'")
     parser.add_argument("-o", "--output", metavar="FILE", help=".nc, .csv or .parquet; none writes nothing")

@@ -13,10 +13,11 @@ from scipy import sparse
 
 from crescentlab import units
 from crescentlab.errors import SimulationError
+from crescentlab.solvers import stepper
 from crescentlab.solvers.hybrid import Hybrid
 from crescentlab.solvers.limits import PressureLimits
 from crescentlab.solvers.roots import RootFinder
-from crescentlab.solvers.scipy import Functions, Stepper, stepper
+from crescentlab.solvers.scipy import Functions, Stepper
 from crescentlab.solvers.trajectory import Happening, Pieces, Recording, Statistics, Trajectory
 from crescentlab.system import System, Values
 
