@@ -33,7 +33,7 @@ from crescentlab.netlist import Netlist
 from crescentlab.prepared import Prepared
 from crescentlab.system import System
 
-SOLVERS = ("lsoda", "rk45", "dop853", "bdf", "radau")
+SOLVERS = ("lsoda", "rk45", "dop853", "bdf", "radau", "cvode")
 REVOLUTION = "30 ms"
 GRID = 1e-5
 FUNCTIONS = ("rhs", "jacobian", "relation", "condition", "remap")

@@ -150,7 +150,7 @@ def _parser() -> tuple[argparse.ArgumentParser, dict[str, argparse.ArgumentParse
 
 def _simulate(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--stop", metavar="T", help="end time, for example '50 ms'")
-    parser.add_argument("--solver", metavar="NAME", help="auto, lsoda, bdf, radau, rk45, dop853, rodas or dopri")
+    parser.add_argument("--solver", metavar="NAME", help="auto, lsoda, bdf, radau, rk45, dop853, cvode, rodas or dopri")
     parser.add_argument(
         "--compile", action=argparse.BooleanOptionalAction, help="compile the equations; by default where it pays"
     )

@@ -71,7 +71,7 @@ class SimulationSection(_Section):
     """How long and how exactly to integrate."""
 
     stop: Time = Field(default=1.0, gt=0, description="end time")
-    solver: Literal["auto", "lsoda", "bdf", "radau", "rk45", "dop853", "rodas", "dopri"] = Field(
+    solver: Literal["auto", "lsoda", "bdf", "radau", "rk45", "dop853", "cvode", "rodas", "dopri"] = Field(
         default="auto", description="integration method"
     )
     rtol: float = Field(default=1e-6, ge=SMALLEST_RTOL, lt=1, description="relative tolerance of every state")

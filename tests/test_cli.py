@@ -285,7 +285,7 @@ def test_stop_when_ends_the_run_before_its_time(capsys: pytest.CaptureFixture[st
     assert found["final_time"] < 0.02
 
 
-@pytest.mark.parametrize("solver", ["auto", "lsoda", "bdf", "radau", "rk45", "dop853"])
+@pytest.mark.parametrize("solver", ["auto", "lsoda", "bdf", "radau", "rk45", "dop853", "cvode", "rodas", "dopri"])
 def test_every_solver_has_a_name(solver: str, capsys: pytest.CaptureFixture[str]) -> None:
     assert run(capsys, "simulate", "filling.yaml", "--quiet", "-o", "none", "--solver", solver)[0] == 0
 

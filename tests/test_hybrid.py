@@ -112,7 +112,7 @@ class Crossing(Clockwork):
         return {"der_x": v, "der_v": 0.0, "up": when(x > self.level), "down": when(x < self.level)}
 
 
-@pytest.mark.parametrize("solver", ["lsoda", "bdf", "radau", "rk45", "dop853", "rodas", "dopri"])
+@pytest.mark.parametrize("solver", ["lsoda", "bdf", "radau", "rk45", "dop853", "rodas", "dopri", "cvode"])
 @pytest.mark.parametrize("level", [0.1234567890123, 1 / 3, 0.9999999])
 def test_state_roots_are_located(solver, level):
     """x = t meets the level at t = level, within 1e-12 of the span (1e-9 is asked for)."""
@@ -131,7 +131,7 @@ class Schedule(Clockwork):
 
 
 @pytest.mark.parametrize("at", [0.1, 0.3, 1 / 3, 0.7, math.pi / 4, 1e-9, 1.0])
-@pytest.mark.parametrize("solver", ["lsoda", "rk45", "rodas", "dopri"])
+@pytest.mark.parametrize("solver", ["lsoda", "rk45", "rodas", "dopri", "cvode"])
 def test_a_time_step_is_hit_exactly(at, solver):
     """A relation linear in t is an exact stop, to the last bit of t; v is then right within the tolerance of 1e-6."""
     result = alone(Schedule, at=f"{at!r} s").simulate(1.0, solver=solver)
@@ -439,7 +439,7 @@ class SampledLine(Component):
         }  # fmt: skip
 
 
-@pytest.mark.parametrize("solver", ["lsoda", "bdf", "radau", "rk45", "dop853", "rodas", "dopri"])
+@pytest.mark.parametrize("solver", ["lsoda", "bdf", "radau", "rk45", "dop853", "rodas", "dopri", "cvode"])
 def test_ticks_whose_output_is_continuous_cost_no_restart(solver):
     """497 ticks, at most 2 restarts; x follows the sine filtered with 0.05 s within the lines' error (dt w)^2/8."""
     result = alone(SampledLine).simulate(497.5 * 2e-3, solver=solver)
@@ -474,7 +474,7 @@ class SampleAndHold(Component):
         return {"der_x": u, "tick": every(self.dt, u=cos(t))}
 
 
-@pytest.mark.parametrize("solver", ["lsoda", "bdf", "radau", "rk45", "dop853", "rodas", "dopri"])
+@pytest.mark.parametrize("solver", ["lsoda", "bdf", "radau", "rk45", "dop853", "rodas", "dopri", "cvode"])
 def test_small_jumps_without_a_restart_keep_the_accuracy(solver):
     """x(N dt) is the sum of dt cos(k dt); each jump dt sin(k dt) is small, their sum is not."""
     result = alone(SampleAndHold).simulate(2.0, solver=solver, rtol=1e-6)
@@ -598,7 +598,7 @@ class Ball(Component):
         return {"der_x": v, "der_v": -9.81, "bounce": when(x < 0, x=0.0, v=-self.e * v)}
 
 
-@pytest.mark.parametrize("solver", ["auto", "bdf", "radau", "rk45", "dop853", "rodas", "dopri"])
+@pytest.mark.parametrize("solver", ["auto", "bdf", "radau", "rk45", "dop853", "rodas", "dopri", "cvode"])
 @pytest.mark.parametrize("e", [0.1, 0.5, 0.8])
 def test_a_zeno_sequence_fails_and_names_the_event(solver, e):
     """Bounces pile up at t1 (1 + e)/(1 - e), t1 = sqrt(2/g): there the run fails, at the default rtol 0.5 % off."""
@@ -686,7 +686,7 @@ class LoneBump(Component):
 
 
 @pytest.mark.parametrize("width", [1e-2, 1e-3, 3e-4])
-@pytest.mark.parametrize("solver", ["auto", "bdf", "radau", "rodas"])
+@pytest.mark.parametrize("solver", ["auto", "bdf", "radau", "rodas", "cvode"])
 def test_a_lone_bump_is_not_stepped_over(width, solver):
     """A bump as short as 0.03 % of the run wakes the filter, which rests before and after it."""
     result = alone(LoneBump, width=f"{width} s").simulate(1.0, solver=solver)
@@ -731,7 +731,7 @@ class Dips(Clockwork):
         }  # fmt: skip
 
 
-@pytest.mark.parametrize("solver", ["auto", "bdf", "radau", "rk45", "dop853", "rodas", "dopri"])
+@pytest.mark.parametrize("solver", ["auto", "bdf", "radau", "rk45", "dop853", "rodas", "dopri", "cvode"])
 def test_two_roots_inside_one_step(solver):
     """Steps of 0.02 contain both roots of each; the first is found to 1e-12, also 1e-7 apart. A touch is no event."""
     result = alone(Dips).simulate(1.0, solver=solver)
@@ -770,7 +770,7 @@ class AtZero(Component):
         }  # fmt: skip
 
 
-@pytest.mark.parametrize("solver", ["auto", "bdf", "radau", "rk45", "dop853", "rodas", "dopri"])
+@pytest.mark.parametrize("solver", ["auto", "bdf", "radau", "rk45", "dop853", "rodas", "dopri", "cvode"])
 def test_a_root_that_stays_at_zero(solver):
     """Only what is true at t0 fires, and no step is wasted on it."""
     result = alone(AtZero).simulate(10.0, solver=solver)
@@ -868,7 +868,7 @@ class Neighbours(Clockwork):
         }  # fmt: skip
 
 
-@pytest.mark.parametrize("solver", ["auto", "bdf", "radau", "rk45", "dop853", "rodas", "dopri"])
+@pytest.mark.parametrize("solver", ["auto", "bdf", "radau", "rk45", "dop853", "rodas", "dopri", "cvode"])
 def test_events_a_rounding_error_apart(solver):
     """All three happen, in order, and v(1) = 1 + 3*0.7."""
     result = alone(Neighbours).simulate(1.0, solver=solver)
@@ -888,7 +888,7 @@ class JustBefore(Clockwork):
         }  # fmt: skip
 
 
-@pytest.mark.parametrize("solver", ["auto", "bdf", "radau", "rk45", "dop853", "rodas", "dopri"])
+@pytest.mark.parametrize("solver", ["auto", "bdf", "radau", "rk45", "dop853", "rodas", "dopri", "cvode"])
 @pytest.mark.parametrize("lead", [1e-2, 1e-4, 1e-8, 1e-12, 0.0])
 def test_a_stop_is_not_lost_behind_an_event_in_the_same_step(solver, lead):
     """The stop at the end of a step is kept when an event inside that step needs no restart."""
@@ -1125,7 +1125,7 @@ def test_a_held_value_that_is_no_number_ends_the_run():
     assert result.time[-1] == pytest.approx(0.5, abs=1e-9)
 
 
-@pytest.mark.parametrize("solver", ["lsoda", "bdf", "rk45", "rodas", "dopri"])
+@pytest.mark.parametrize("solver", ["lsoda", "bdf", "rk45", "rodas", "dopri", "cvode"])
 def test_growth_beyond_all_numbers_names_the_state(solver):
     """exp(2000 t) leaves the floating-point numbers at 0.35 s; no warning, the state is named, the run is kept."""
     result = alone(Explosion).simulate(1.0, solver=solver, rtol=1e-4, check=False)

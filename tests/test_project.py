@@ -47,7 +47,19 @@ FOR_COMPONENTS = {"component", "domain", "errors", "fluid", "maths", "tables", "
 FOR_PARAMETERS = {"numpy", "pydantic", "pydantic_core"}
 """Packages that component files may use for parameters and start values (equations use `crescentlab.maths`)."""
 
-HEAVY = ["casadi", "h5netcdf", "matplotlib", "networkx", "numpy", "pandas", "pyarrow", "pydantic", "scipy", "xarray"]
+HEAVY = [
+    "casadi",
+    "h5netcdf",
+    "matplotlib",
+    "networkx",
+    "numpy",
+    "pandas",
+    "pyarrow",
+    "pydantic",
+    "scipy",
+    "sksundae",
+    "xarray",
+]
 """Packages imported only inside commands, so that `crescentlab --version` answers at once."""
 
 RESULT_FILES = {".nc", ".h5", ".hdf5", ".parquet", ".npy", ".npz", ".pickle", ".pkl", ".so", ".whl", ".zip", ".gz"}

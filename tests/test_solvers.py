@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import gc
 import math
+import sys
+import threading
 
 import numpy as np
 import pytest
@@ -15,18 +18,21 @@ from crescentlab.component import Component
 from crescentlab.domain import held, state
 from crescentlab.maths import cos, sin, stack, total, when, where
 from crescentlab.solvers import scipy as steppers
+from crescentlab.solvers import sundials
 from crescentlab.solvers.functions import Functions
 from crescentlab.solvers.integrate import integrate
 from crescentlab.solvers.options import Options
-from crescentlab.solvers.scipy import banded, choose, stepper
+from crescentlab.solvers.scipy import banded, choose
+from crescentlab.solvers.steppers import stepper
 from crescentlab.units import Flow, Pressure, Ratio
 
-SOLVERS = ["auto", "lsoda", "bdf", "radau", "rk45", "dop853", "rodas", "dopri"]
-IMPLICIT = ["auto", "lsoda", "bdf", "radau", "rodas"]
+SOLVERS = ["auto", "lsoda", "bdf", "radau", "rk45", "dop853", "cvode", "rodas", "dopri"]
+IMPLICIT = ["auto", "lsoda", "bdf", "radau", "cvode", "rodas"]
 LAYOUTS = {
     "lsoda dense": ("lsoda", "dense"), "lsoda banded": ("lsoda", "banded"), "bdf dense": ("bdf", "dense"),
     "bdf sparse": ("bdf", "sparse"), "radau dense": ("radau", "dense"), "radau sparse": ("radau", "sparse"),
-    "rk45": ("rk45", "dense"), "dop853": ("dop853", "dense"),
+    "rk45": ("rk45", "dense"), "dop853": ("dop853", "dense"), "cvode dense": ("cvode", "dense"),
+    "cvode banded": ("cvode", "banded"), "cvode sparse": ("cvode", "sparse"),
 }  # fmt: skip
 """Every method with every layout it knows."""
 
@@ -186,13 +192,14 @@ def test_a_chain_of_300_volumes_and_gaps(monkeypatch):
     assert found.trajectory.statistics.evaluations < 2 * full.trajectory.statistics.evaluations
 
 
-@pytest.mark.parametrize("solver", ["bdf", "auto"])
+@pytest.mark.parametrize("solver", ["bdf", "auto", "cvode"])
 def test_a_large_row(solver):
-    """1500 cells in a stirred order: sparse BDF, and what auto takes (banded LSODA), against the discrete diffusion."""
+    """1500 cells in a stirred order: sparse BDF, banded CVODE and LSODA (auto), against the discrete diffusion."""
     run, part = alone(Row, n=1500, stride=7), Row(n=1500, stride=7)
     system = run.system()
     functions = Functions(system, system.values(run.design()))
-    assert choose(solver, functions) == {"bdf": ("bdf", "sparse"), "auto": ("lsoda", "banded")}[solver]
+    taken = {"bdf": ("bdf", "sparse"), "auto": ("lsoda", "banded"), "cvode": ("cvode", "banded")}
+    assert choose(solver, functions) == taken[solver]
     stop = 0.5 / part.rate(1)
     result = run.simulate(stop, solver=solver, rtol=1e-6)
     np.testing.assert_allclose(result["part.x"][-1], part.exact(stop), atol=2e-4)
@@ -266,7 +273,7 @@ def test_states_return_from_a_reordered_band_in_their_own_order():
     run = alone(Row, n=11, stride=4)
     system = run.system()
     values = system.values(run.design())
-    made = steppers._Lsoda("lsoda", Functions(system, values), 1e-8, np.full(11, 1e-8), "banded")
+    made = steppers.Lsoda("lsoda", Functions(system, values), 1e-8, np.full(11, 1e-8), "banded")
     np.testing.assert_array_equal(made.outer(made.inner(values.x0)), values.x0)
     made.restart(0.0, values.x0, 1.0)
     made.step(0.01)
@@ -434,3 +441,159 @@ def test_a_run_from_another_start_time(solver):
     t, x, _, _ = trajectory.steps.arrays()
     assert (t[0], t[-1]) == (5.0, 8.0)
     np.testing.assert_allclose(x[:, 0], np.cos(t - 5), atol=1e-5)
+
+
+# -- CVODE ---------------------------------------------------------------------------------------
+
+
+def cvode(component, layout="dense", rtol=1e-8, **parameters):
+    """A CVODE stepper at the beginning of a run of 20 s, and the values of the run."""
+    run = alone(component, **parameters)
+    system = run.system()
+    values = system.values(run.design())
+    made = sundials.Cvode(Functions(system, values), rtol, rtol * system.nominal, layout)
+    made.restart(0.0, values.x0, 20.0)
+    return made
+
+
+@pytest.mark.parametrize("layout", ["dense", "banded", "sparse"])
+def test_cvode_is_given_the_exact_matrix(layout):
+    """Second differences in the order of its states: full, also for the banded solver, or the nonzeros by columns."""
+    made, places = cvode(Row, layout, n=11, stride=4), Row(n=11, stride=4).places()
+    expected = np.zeros((11, 11))
+    for k, place in enumerate(places):
+        expected[place, place] = -2
+        if k:
+            expected[place, places[k - 1]] = expected[places[k - 1], place] = 1
+    if layout == "banded":
+        assert (made.lower, made.upper) == (1, 1)
+        expected = expected[np.ix_(made.order, made.order)]
+    if layout == "sparse":
+        expected = expected.T[expected.T != 0]
+    matrix = np.zeros_like(expected)
+    made.fill(0.0, made.y, made.y, matrix)
+    np.testing.assert_array_equal(matrix, expected)
+
+
+def test_a_sparse_cvode_that_never_stepped_is_freed():
+    """Its sparse solver would take the interpreter down, had it never factorised a matrix."""
+    for _ in range(20):
+        cvode(Star, "sparse", n=50)
+        gc.collect()
+
+
+def test_cvode_takes_the_matrix_that_suits():
+    """Full while small, banded where narrow, else sparse."""
+    found = {}
+    for name, part, n in (("small", Star, 40), ("narrow", Row, 100), ("wide", Star, 100)):
+        run = alone(part, n=n)
+        system = run.system()
+        found[name] = choose("cvode", Functions(system, system.values(run.design())))
+    assert found == {"small": ("cvode", "dense"), "narrow": ("cvode", "banded"), "wide": ("cvode", "sparse")}
+
+
+@pytest.mark.parametrize("layout", ["dense", "banded"])
+def test_the_interpolant_of_cvode_is_its_own(layout):
+    """Kept and read after more steps, it gives what CVODE itself gave within the step, to rounding; so the rate."""
+    made = cvode(Row, layout, n=11, stride=4)
+    kept = []
+    for _ in range(60):
+        low, start = made.t, made.x
+        made.step(20.0)
+        times = np.linspace(low, made.t, 9)
+        own = np.array([made.outer(made.cvode.step(t, "normal").y) for t in times[:-1].tolist()] + [made.x])
+        made.cvode.step(made.t, "normal", made.t)
+        np.testing.assert_allclose(made.interpolant()(float(times[3])), own[3], atol=1e-14)
+        np.testing.assert_allclose(own[0], start, atol=1e-14)
+        np.testing.assert_allclose(made.rate(), made.functions.rhs(made.t, made.x), atol=1e-7)
+        kept.append((made.path(), times, own))
+    assert made.t > 1.0
+    for path, times, own in kept:
+        np.testing.assert_allclose(path(times), own, atol=1e-14)
+
+
+@pytest.mark.parametrize("growth", [sundials.GROWTH, 0.0])
+def test_cvode_moves_on_past_a_bound_without_a_start(growth, monkeypatch):
+    """Seven bounds, one start; were steps to grow faster than is known, it would begin anew at a bound, as accurate."""
+    starts = []
+    begin = sundials.Cvode.begin
+    monkeypatch.setattr(sundials, "GROWTH", growth)
+    monkeypatch.setattr(sundials.Cvode, "begin", lambda self, t, y: (starts.append(t), begin(self, t, y)))
+    made = stepped("cvode", [0.1, 1.0, 1.5, 7.3, 7.3000001, 19.0, 20.0])
+    np.testing.assert_allclose(made.x, [math.cos(20), -math.sin(20)], atol=5e-6)
+    assert starts == [0.0] if growth else len(starts) > 4
+
+
+def test_a_moving_bound_does_not_cut_the_steps_of_cvode():
+    """Kept to 0.1 at a time a slow decay takes steps of 0.1, but for those of its start."""
+    made = cvode(StiffDecay, rtol=1e-4, rate=0.01)
+    sizes = []
+    while made.t < 10:
+        low = made.t
+        made.step(low + 0.1)
+        sizes.append(made.t - low)
+    np.testing.assert_allclose(sizes[20:], 0.1, rtol=1e-9)
+
+
+def test_bounds_as_close_as_the_clock_allows():
+    """Bounds of one and of some hundred units in the last place apart are met, and the run goes on."""
+    made = cvode(Swing)
+    bounds = [1.0, 1.0 + 2**-52, 1.0 + 2**-44, 1.0 + 2**-35, 1.0 + 2**-30, 2.0]
+    for bound in bounds:
+        while made.t < bound:
+            made.step(bound)
+        assert made.t == bound
+        np.testing.assert_allclose(made.x, [math.cos(bound), -math.sin(bound)], atol=1e-6)
+        np.testing.assert_allclose(made.rate(), [-math.sin(bound), -math.cos(bound)], atol=1e-5)
+
+
+class Pole(Component):
+    """x' = x^2 from 1: 1/(1 - t)."""
+
+    x = plain("x", 1.0)
+
+    def equations(self, x):
+        return {"der_x": x**2}
+
+
+def test_a_failure_of_cvode_is_an_error_and_not_a_print(capfd):
+    """No step leads past the pole: the run ends there with the state's name, and nothing reaches the terminal."""
+    result = alone(Pole).simulate(2.0, solver="cvode", check=False)
+    assert result.trajectory.status == "failed"
+    assert "part.x" in result.trajectory.error
+    assert result.time[-1] == pytest.approx(1.0, abs=1e-3)
+    assert capfd.readouterr() == ("", "")
+
+
+def test_an_interruption_passes_through_cvode(capfd):
+    """What the user interrupts is interrupted, and standard output is what it was."""
+    made, output = cvode(Swing), sys.stdout
+
+    def interrupted(t, y):
+        raise KeyboardInterrupt
+
+    made.rhs = interrupted
+    with pytest.raises(KeyboardInterrupt):
+        made.step(1.0)
+    assert sys.stdout is output
+    assert made.t == 0.0
+    assert capfd.readouterr() == ("", "")
+
+
+def test_what_other_threads_print_during_a_step_is_seen(capsys):
+    """CVODE's own messages are kept back, those of others are not."""
+    made = cvode(Swing)
+    f = made.rhs
+
+    def talking(t, y):
+        thread = threading.Thread(target=print, args=("seen",))
+        thread.start()
+        thread.join()
+        print("unseen")
+        return f(t, y)
+
+    made.rhs = talking
+    made.step(1e-6)
+    out = capsys.readouterr().out
+    assert "seen\n" in out
+    assert "unseen" not in out

@@ -1,1 +1,1 @@
-"""System -> Trajectory: one event loop over SciPy's steppers."""
+"""System -> Trajectory: an event loop over the steppers of SciPy and SUNDIALS, and a compiled one with its own."""

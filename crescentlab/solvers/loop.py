@@ -19,7 +19,8 @@ from crescentlab.solvers.options import ANGLE_STEP, RESTART_SHARE, Options
 from crescentlab.solvers.pace import CLOCK_SWING, clock_pace
 from crescentlab.solvers.promotion import Promotion
 from crescentlab.solvers.roots import RootFinder
-from crescentlab.solvers.scipy import Stepper, stepper
+from crescentlab.solvers.scipy import Stepper
+from crescentlab.solvers.steppers import stepper
 from crescentlab.solvers.trajectory import Happening, Paths, Recording, Statistics, Trajectory
 from crescentlab.system import System, Values
 
@@ -87,13 +88,14 @@ class _Run:
         self.step_cap = options.step_cap
         self.pace = clock_pace(system, values, options.start, options.stop)
         self.tiny = 0
+        self.shown_at = 0.0
         self.give_up: Callable[[], bool] | None = None
         self.count_at = FIRST_COUNT
 
     # -- the run ---------------------------------------------------------------------------------
 
     def run(self) -> Trajectory:
-        begun = self.begun = self.shown_at = time.perf_counter()
+        begun = self.begun = time.perf_counter()
         status, error = "done", ""
         try:
             with np.errstate(all="ignore"):  # what is not finite is told by name, not by a warning

@@ -1,7 +1,7 @@
 """SciPy's steppers behind one interface: step up to a bound, interpolate, restart.
 
 LSODA keeps a critical time of its own (``rwork[0]``) that must move with the bound; that private
-detail lives in :class:`_Lsoda` and nowhere else.
+detail lives in :class:`Lsoda` and nowhere else.
 """
 
 from __future__ import annotations
@@ -24,10 +24,14 @@ BAND_LIMIT = 100
 """... at most this wide, is integrated as banded."""
 WIDE = 120
 """Beyond this many states of wide band, BDF with the sparse Jacobian overtakes LSODA with a full matrix."""
+CVODE_SMALL = 60
+"""Up to this many states CVODE with a full matrix is about as quick as with any other ...."""
+CVODE_BAND = 50
+"""... and beyond it a wider band than this costs more than the sparse matrix."""
 
 MULTISTEP_SHARE = 0.2
-"""Share of the tolerance that LSODA and BDF work to: at equal rtol their errors add up to some 20 times those of the
-Runge-Kutta methods (benchmarks/pump.py)."""
+"""Share of the tolerance that LSODA, BDF and CVODE work to: at equal rtol their errors add up to some 20 times those of
+the Runge-Kutta methods (benchmarks/pump.py)."""
 
 METHODS: dict[str, Any] = {
     "bdf": integrate.BDF, "radau": integrate.Radau, "rk45": integrate.RK45, "dop853": integrate.DOP853,
@@ -44,7 +48,7 @@ class Stepper:
 
     def __init__(self, name: str, functions: Functions, rtol: float, atol: np.ndarray, layout: str) -> None:
         self.name, self.functions = name, functions
-        share = MULTISTEP_SHARE if name in ("lsoda", "bdf") else 1.0
+        share = MULTISTEP_SHARE if name in ("lsoda", "bdf", "cvode") else 1.0
         self.rtol, self.atol = max(share * rtol, 100 * np.finfo(float).eps), share * atol
         self.order: np.ndarray | None = None
         self.solver: Any = None
@@ -152,7 +156,7 @@ class Stepper:
         return dense if self.order is None else (lambda t: self.outer(dense(t)))
 
 
-class _Lsoda(Stepper):
+class Lsoda(Stepper):
     """LSODA's critical time follows the bound, so a continued run never overshoots it."""
 
     def restart(self, t: float, x: np.ndarray, bound: float) -> None:
@@ -192,7 +196,7 @@ class _Nordsieck:
         return states if self.back is None else states[:, self.back]
 
 
-class _Stateless(Stepper):
+class Stateless(Stepper):
     """A circuit without states: every step reaches the bound."""
 
     def restart(self, t: float, x: np.ndarray, bound: float) -> None:
@@ -234,19 +238,12 @@ def choose(name: str, functions: Functions) -> tuple[str, str]:
         return name, "dense"
     if name in ("bdf", "radau"):
         return name, "sparse" if n > WIDE else "dense"
-    if n <= SMALL:
-        return "lsoda", "dense"
+    if n <= (CVODE_SMALL if name == "cvode" else SMALL):
+        return "cvode" if name == "cvode" else "lsoda", "dense"
     _, lower, upper = banded(functions.pattern)
     width = lower + upper + 1
+    if name == "cvode":
+        return name, "banded" if width <= BAND_SHARE * n and width <= CVODE_BAND else "sparse"
     if width <= BAND_SHARE * n and width <= BAND_LIMIT:
         return "lsoda", "banded"
     return ("bdf", "sparse") if name == "auto" and n > WIDE else ("lsoda", "dense")
-
-
-def stepper(name: str, functions: Functions, rtol: float, atol: np.ndarray) -> Stepper:
-    """The stepper that ``--solver NAME`` means for this system."""
-    if functions.n == 0:
-        return _Stateless("rk45", functions, rtol, atol, "dense")
-    method, layout = choose(name, functions)
-    kind = _Lsoda if method == "lsoda" else Stepper
-    return kind(method, functions, rtol, atol, layout)

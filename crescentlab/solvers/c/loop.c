@@ -13,7 +13,7 @@ static const double ROUNDOFF = 16 * 2.220446049250313e-16; /* of a relation, in 
 static const double SAFETY = 0.9, SHRINK = 0.2, GROW = 5;
 static const double SMALLEST = 1e-14; /* share of the run: a shorter rejected step is a collapse */
 static const double EVEN = 1e-9; /* a relation whose rate changed by less, relatively, moves evenly */
-enum { MAX_TRIES = 80, SECANTS = 8, SAMPLES = 16, COLLAPSE_COUNT = 500 };
+enum { MAX_TRIES = 80, SECANTS = 8, SAMPLES = 16, COLLAPSE_COUNT = 500, FEW = 2 };
 
 static const Method *method_of(const Run *r) { return r->method == RODAS ? &rodas : &dopri; }
 
@@ -411,6 +411,26 @@ typedef struct Search {
     int tries;
 } Search;
 
+/* Whether relations that turned within the candidate may as well turn at its end: neither one of them nor both fire
+ * anything, nor change f by more than may pass unseen. A valve at rest, whose force is rounding, turns at every step. */
+static int harmless(Run *r, double h, const int64_t *turned, int64_t count)
+{
+    int harm = 0;
+    for (int64_t mask = 1; !harm && mask < 1 << count; mask++) {
+        for (int64_t k = 0; k < count; k++) r->b[turned[k]] = mask >> k & 1 ? !r->b[turned[k]] : r->b[turned[k]];
+        put(r, r->t + h, r->x_new);
+        if (r->n_conditions) call(r, r->condition);
+        for (int64_t k = 0; k < r->n_conditions; k++) harm |= r->conditions[k] > 0.5 && !r->holds[k];
+        if (!harm && mask == (1 << count) - 1) memcpy(r->v_in, rhs(r, r->t + h, r->x_new), r->n * sizeof *r->v_in);
+        for (int64_t k = 0; k < count; k++) r->b[turned[k]] = mask >> k & 1 ? !r->b[turned[k]] : r->b[turned[k]];
+    }
+    if (harm) return 0;
+    rhs(r, r->t + h, r->x_new);
+    for (int64_t i = 0; i < r->n; i++)
+        if (fabs(r->v_in[i] - r->fx[i]) * h > r->restart_share * (r->atol[i] + r->rtol * fabs(r->x_new[i]))) return 0;
+    return 1;
+}
+
 /* Where the accepted candidate of length h leaves the run: 0 it stands without an event, h it ends on an event,
  * else the length to try instead. */
 static double locate(Run *r, double h, Search *s)
@@ -419,7 +439,7 @@ static double locate(Run *r, double h, Search *s)
     put(r, r->t + h, r->x_new);
     memcpy(r->v_in, r->rate_new, r->n * sizeof *r->v_in);
     call(r, r->watch);
-    int64_t behind = 0, turned = 0;
+    int64_t behind = 0, turned = 0, who[FEW];
     for (int64_t j = 0; j < r->n_watched; j++) {
         const double roundoff = ROUNDOFF * r->w_scale[j];
         r->after[j] = r->side[j] * r->w[j];
@@ -428,11 +448,13 @@ static double locate(Run *r, double h, Search *s)
         const int truth = side_of(r, r->w[j], r->w_rate[j], r->w_scale[j], r->strict[r->watched[j]]);
         if (truth == (r->side[j] > 0)) continue;
         if (h <= 4 * r->tolerance && r->slope_new[j] > 0) continue; /* rounding at the start: it is heading back */
+        if (turned < FEW) who[turned] = r->watched[j];
         turned++;
         if (r->after[j] < -2 * r->tolerance * fabs(r->slope_new[j]) - roundoff) behind++;
     }
     s->tries++;
     if (turned && (!behind || h - s->low <= r->tolerance || s->tries > MAX_TRIES)) return h;
+    if (behind && s->tries == 1 && turned <= FEW && harmless(r, h, who, turned)) return h;
     if (!turned && s->tries > MAX_TRIES) return 0;
     if (!turned && s->high && s->high - h <= r->tolerance) return s->high; /* known to end on it */
     double next = 2; /* first turning, in shares of the candidate */
@@ -440,7 +462,7 @@ static double locate(Run *r, double h, Search *s)
         double theta = 2;
         if (r->after[j] < -r->band[j] && !r->wave[j] && r->before[j] > r->band[j] && r->slope[j] < 0 && r->slope_new[j] < 0)
             theta = close_in(r, j, h, 0, 1);
-        else if (r->after[j] < -r->band[j] || r->wave[j] || may_dip(r, j, h))
+        else if (r->after[j] < -r->band[j] || ((r->wave[j] || may_dip(r, j, h)) && !harmless(r, h, r->watched + j, 1)))
             theta = first_turn(r, j, h);
         else if (!turned && s->high && r->slope_new[j] < 0)
             theta = 1 - r->after[j] / r->slope_new[j] / h; /* short of the event: as far as its rate says */
@@ -450,7 +472,7 @@ static double locate(Run *r, double h, Search *s)
     if (turned) {
         s->high = h;
         if (!(next < h)) next = h - (h - s->low) / 2;
-        if (next <= s->low) next = s->low + (s->nudge = fmax(2 * s->nudge, r->tolerance));
+        if (next <= s->low) next = fmin(s->low + (s->nudge = fmax(2 * s->nudge, r->tolerance)), s->low + (h - s->low) / 2);
     } else if (next < h) { /* a dip or a wave, or an earlier relation */
         if (next <= r->tolerance || next <= s->low) next = s->low + (s->nudge = fmax(2 * s->nudge, r->tolerance));
         if (next >= h) return 0;
@@ -544,7 +566,8 @@ static int step(Run *r)
     Search search = {0, 0, 0, 0};
     for (;;) {
         const double error = r->n ? method->attempt(r, h) : 0;
-        if (!(error <= 1)) {
+        /* a longer step has been good enough where the search goes on below one */
+        if (!(error <= 1) && !(search.high > h && isfinite(error))) {
             r->rejected++;
             rejected = 1;
             full = 0;
