@@ -21,6 +21,9 @@ HEADER = "wide.h"
 _BODY = re.compile(r"(static int \w+\(const casadi_real\*\* arg[^{]*\{\n)(.*?)(  return 0;\n\})", re.DOTALL)
 _REGISTER = re.compile(r"\ba\d+\b")
 _ASSIGNMENT = re.compile(r"  (a\d+)=(.*);")
+_HALF = re.compile(r"\((v\d+)\?(v\d+):0\)")
+_NOT = re.compile(r"\(!(v\d+)\)")
+_SUM = re.compile(r"\((v\d+)\+(v\d+)\)")
 _CALL = re.compile(r"(exp|log|pow)\(([\w.]+)(?:,([\w.]+))?\)")
 
 
@@ -47,6 +50,8 @@ class _Body:
         self.rank: dict[str, int] = {}
         self.name: dict[str, str] = {}
         """What each register holds now."""
+        self.text: dict[str, str] = {}
+        """What each value is computed from."""
 
     def read(self, line: str) -> None:
         """Take one statement; every value gets a name of its own, registers are used again and again."""
@@ -59,6 +64,7 @@ class _Body:
             self.plain[rank].append(renamed)
             return
         target = self.name[assigned[1]] = f"v{len(self.rank)}"
+        self.text[target] = renamed = self.whole(renamed)
         call = _CALL.fullmatch(renamed)
         if call is None:
             self.rank[target] = rank
@@ -66,6 +72,15 @@ class _Body:
         else:
             self.rank[target] = rank + 1
             self.slow[rank][call[1]].append((target, *[part for part in call.groups()[1:] if part]))
+
+    def whole(self, text: str) -> str:
+        """A choice in one, where CasADi adds its halves: (c?a:0) + (!c?b:0) is c?a:b."""
+        terms = _SUM.fullmatch(text)
+        first, second = (_HALF.fullmatch(self.text[term]) for term in terms.groups()) if terms else (None, None)
+        for one, other in ((first, second), (second, first)):
+            if one and other and (denied := _NOT.fullmatch(self.text[other[1]])) and denied[1] == one[1]:
+                return f"({one[1]}?{one[2]}:{other[2]})"
+        return text
 
     def lines(self) -> list[str]:
         """All statements, rank by rank."""

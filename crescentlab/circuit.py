@@ -24,7 +24,6 @@ from crescentlab.library import Library, installed
 from crescentlab.netlist import SMALLEST_RTOL, Netlist, SimulationSection
 from crescentlab.plotting import check_plots
 from crescentlab.result import Result
-from crescentlab.solvers.integrate import integrate
 from crescentlab.solvers.options import Options
 from crescentlab.system import System
 from crescentlab.trace import structure_of
@@ -127,6 +126,8 @@ class Circuit:
         )  # fmt: skip
         _check(options)
         values = system.values(design)
+        from crescentlab.solvers.integrate import integrate  # a third of a second of SciPy that `check` does without
+
         trajectory = integrate(system, values, options, progress)
         result = Result(system, values, design, trajectory)
         if check and trajectory.status == "failed":

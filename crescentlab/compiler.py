@@ -25,7 +25,16 @@ from crescentlab.errors import CompilerError
 
 EXACT = ("-O1", "-std=c99", "-fPIC", "-shared", "-fno-math-errno", "-ffp-contract=off")
 """No flag that changes a number."""
-NATIVE = ("-O2", "-std=c99", "-fPIC", "-shared", "-fno-math-errno", "-fno-semantic-interposition", "-march=native")
+NATIVE = (
+    "-O2",
+    "-std=c99",
+    "-fPIC",
+    "-shared",
+    "-fno-math-errno",
+    "-fno-semantic-interposition",
+    "-freciprocal-math",
+    "-march=native",
+)
 """For this machine alone."""
 CANDIDATES = ("cc", "gcc", "clang")
 
@@ -132,11 +141,12 @@ class Job(threading.Thread):
             self.error = error
 
     def cancel(self) -> None:
-        """Stop building, as soon as may be."""
+        """Stop building, and wait until it has stopped."""
         self.cancelled = True
-        if self.is_alive() and self.process is not None:
-            self.process.terminate()
-            self.join(5)
+        while self.is_alive():
+            if self.process is not None:
+                self.process.terminate()
+            self.join(0.05)
 
 
 def _first_error(text: str) -> str:

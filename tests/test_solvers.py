@@ -6,16 +6,19 @@ import gc
 import math
 import sys
 import threading
+import types
 
 import numpy as np
 import pytest
 from building import OIL, alone, circuit, fired
 from pydantic import Field
+from scipy import sparse
 from scipy.optimize import brentq
 from scipy.special import expi
 
 from crescentlab.component import Component
 from crescentlab.domain import held, state
+from crescentlab.errors import InputError
 from crescentlab.maths import cos, sin, stack, total, when, where
 from crescentlab.solvers import scipy as steppers
 from crescentlab.solvers import sundials
@@ -597,3 +600,13 @@ def test_what_other_threads_print_during_a_step_is_seen(capsys):
     out = capsys.readouterr().out
     assert "seen\n" in out
     assert "unseen" not in out
+
+
+def test_a_full_matrix_of_many_rows_is_refused():
+    """Three thousand parts that all meet one: LSODA would ask for 9 million numbers; the message says what to write."""
+    functions = types.SimpleNamespace(
+        n=3001, pattern=sparse.csc_matrix(sparse.random_array((3001, 3001), density=0.01))
+    )
+    with pytest.raises(InputError, match=r"lsoda needs a full matrix of 3001 x 3001 .* write bdf or cvode"):
+        choose("lsoda", functions)
+    assert choose("auto", functions) == ("bdf", "sparse")

@@ -15,11 +15,11 @@ from typing import Any
 import casadi  # noqa: F401  # loads the library looked into below
 import numpy as np
 
-from crescentlab.compiler import EXACT, Source, build
+from crescentlab.compiler import NATIVE, Source, build
 from crescentlab.errors import CompilerError
 
 SOURCES = ("run.h", "loop.c", "lu.c", "rodas.c", "dopri.c")
-OPTIMISED = ("-O2", *EXACT[1:])
+OPTIMISED = ("-O3", *NATIVE[1:])
 ROWS_BYTES = 8_000_000
 """About how much is recorded before Python empties the records."""
 CALL_FUNCTION = "_ZN6casadi21_function_buffer_evalEPv"

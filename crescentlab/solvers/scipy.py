@@ -13,7 +13,7 @@ import numpy as np
 from scipy import integrate, sparse
 from scipy.sparse.csgraph import reverse_cuthill_mckee
 
-from crescentlab.errors import SimulationError
+from crescentlab.errors import InputError, SimulationError
 from crescentlab.solvers.functions import Functions
 
 SMALL = 25
@@ -28,6 +28,9 @@ CVODE_SMALL = 60
 """Up to this many states CVODE with a full matrix is about as quick as with any other ...."""
 CVODE_BAND = 50
 """... and beyond it a wider band than this costs more than the sparse matrix."""
+
+LARGEST_FULL = 3000
+"""A full matrix of more rows takes over 70 MB and a second to factorise."""
 
 MULTISTEP_SHARE = 0.2
 """Share of the tolerance that LSODA, BDF and CVODE work to: at equal rtol their errors add up to some 20 times those of
@@ -51,6 +54,8 @@ class Stepper:
         share = MULTISTEP_SHARE if name in ("lsoda", "bdf", "cvode") else 1.0
         self.rtol, self.atol = max(share * rtol, 100 * np.finfo(float).eps), share * atol
         self.order: np.ndarray | None = None
+        self.place: np.ndarray | None = None
+        """Where each state stands in the order that narrows the band."""
         self.solver: Any = None
         self.options: dict[str, Any] = {}
         self.rhs: Callable[[float, np.ndarray], np.ndarray] = functions.rhs
@@ -69,9 +74,8 @@ class Stepper:
     def set_band(self, pattern: sparse.csc_matrix) -> None:
         order, lower, upper = banded(pattern)
         self.order, self.lower, self.upper = order, lower, upper
-        place = np.argsort(order)
-        self.rows, self.columns = place[self.rows], place[self.columns]
-        back = place
+        back = self.place = np.argsort(order)
+        self.rows, self.columns = back[self.rows], back[self.columns]
         f = self.functions.rhs
         self.rhs = lambda t, y: f(t, y[back])[order]
         self.atol = self.atol[order]
@@ -146,8 +150,7 @@ class Stepper:
 
     def path(self) -> Path:
         """The states within the last step, as a function to be sampled after the run."""
-        dense, order = self.solver.dense_output(), self.order
-        back = None if order is None else np.argsort(order)
+        dense, back = self.solver.dense_output(), self.place
         return lambda times: dense(times).T if back is None else dense(times).T[:, back]
 
     def interpolant(self) -> Callable[[float], np.ndarray]:
@@ -176,8 +179,7 @@ class Lsoda(Stepper):
         integrator, n = self.solver._lsoda_solver._integrator, self.functions.n
         work, order = integrator.rwork, int(integrator.iwork[13])
         scale = (work[11] / work[10]) ** order if integrator.iwork[14] < order else 1.0
-        back = None if self.order is None else np.argsort(self.order)
-        return _Nordsieck(self.solver.t, work[11], work[20 : 20 + (order + 1) * n].copy(), n, scale, back)
+        return _Nordsieck(self.solver.t, work[11], work[20 : 20 + (order + 1) * n].copy(), n, scale, self.place)
 
 
 class _Nordsieck:
@@ -246,4 +248,7 @@ def choose(name: str, functions: Functions) -> tuple[str, str]:
         return name, "banded" if width <= BAND_SHARE * n and width <= CVODE_BAND else "sparse"
     if width <= BAND_SHARE * n and width <= BAND_LIMIT:
         return "lsoda", "banded"
+    if name == "lsoda" and n > LARGEST_FULL:
+        said = f"solver lsoda needs a full matrix of {n} x {n} here, whose band is {width} wide; write bdf or cvode"
+        raise InputError(said)
     return ("bdf", "sparse") if name == "auto" and n > WIDE else ("lsoda", "dense")

@@ -177,8 +177,7 @@ class Cvode(Stepper):
         return self.functions.f(self.t, self.x, self.functions.h, self.functions.b)[0]
 
     def path(self) -> Path:
-        back = None if self.order is None else np.argsort(self.order)
-        return _Polynomial(self.at, self.h, self.y, self.coefficients, back)
+        return _Polynomial(self.at, self.h, self.y, self.coefficients, self.place)
 
     def interpolant(self) -> Callable[[float], np.ndarray]:
         path = self.path()

@@ -24,14 +24,14 @@ static const double a[STAGES][STAGES - 1] = {
 static const double e[STAGES] = {
     -71.0 / 57600, 0, 71.0 / 16695, -71.0 / 1920, 17253.0 / 339200, -22.0 / 525, 1.0 / 40,
 };
-static const double dense[STAGES][4] = {
-    {1, -8048581381.0 / 2820520608, 8663915743.0 / 2820520608, -12715105075.0 / 11282082432},
-    {0, 0, 0, 0},
-    {0, 131558114200.0 / 32700410799, -68118460800.0 / 10900136933, 87487479700.0 / 32700410799},
-    {0, -1754552775.0 / 470086768, 14199869525.0 / 1410260304, -10690763975.0 / 1880347072},
-    {0, 127303824393.0 / 49829197408, -318862633887.0 / 49829197408, 701980252875.0 / 199316789632},
-    {0, -282668133.0 / 205662961, 2019193451.0 / 616988883, -1453857185.0 / 822651844},
-    {0, 40617522.0 / 29380423, -110615467.0 / 29380423, 69997945.0 / 29380423},
+static const double dense[4][STAGES] = {
+    {1},
+    {-8048581381.0 / 2820520608, 0, 131558114200.0 / 32700410799, -1754552775.0 / 470086768,
+     127303824393.0 / 49829197408, -282668133.0 / 205662961, 40617522.0 / 29380423},
+    {8663915743.0 / 2820520608, 0, -68118460800.0 / 10900136933, 14199869525.0 / 1410260304,
+     -318862633887.0 / 49829197408, 2019193451.0 / 616988883, -110615467.0 / 29380423},
+    {-12715105075.0 / 11282082432, 0, 87487479700.0 / 32700410799, -10690763975.0 / 1880347072,
+     701980252875.0 / 199316789632, -1453857185.0 / 822651844, 69997945.0 / 29380423},
 };
 
 static double attempt(Run *r, double h)
@@ -41,18 +41,11 @@ static double attempt(Run *r, double h)
     memcpy(k, r->rate, n * sizeof *k);
     for (int s = 1; s < STAGES; s++) {
         double *const x = s < STAGES - 1 ? r->work : r->x_new;
-        for (int64_t i = 0; i < n; i++) {
-            double sum = 0;
-            for (int j = 0; j < s; j++) sum += a[s][j] * k[j * n + i];
-            x[i] = r->x[i] + h * sum;
-        }
+        combine(n, x, r->x, h, k, a[s], s);
         memcpy(k + s * n, rhs(r, r->t + c[s] * h, x), n * sizeof *k);
     }
-    for (int64_t i = 0; i < n; i++) {
-        double sum = 0;
-        for (int j = 0; j < STAGES; j++) sum += e[j] * k[j * n + i];
-        r->work[i] = h * sum;
-    }
+    memset(r->work, 0, n * sizeof *k);
+    combine(n, r->work, r->work, h, k, e, STAGES);
     return error_norm(r, r->work);
 }
 
@@ -61,12 +54,11 @@ static void finish(Run *r, double h)
     const int64_t n = r->n;
     memcpy(r->coef, r->x, n * sizeof *r->coef);
     memcpy(r->rate_new, r->stages + (STAGES - 1) * n, n * sizeof *r->rate_new);
-    for (int p = 0; p < 4; p++)
-        for (int64_t i = 0; i < n; i++) {
-            double sum = 0;
-            for (int j = 0; j < STAGES; j++) sum += dense[j][p] * r->stages[j * n + i];
-            r->coef[(p + 1) * n + i] = h * sum;
-        }
+    for (int p = 0; p < 4; p++) {
+        double *const row = r->coef + (p + 1) * n;
+        memset(row, 0, n * sizeof *row);
+        combine(n, row, row, h, r->stages, dense[p], STAGES);
+    }
     r->rate_exact = 1;
 }
 

@@ -43,6 +43,18 @@ void linearise(Run *r, double t, const double *x)
     r->linearised = 1;
 }
 
+/* to = from + factor sum_j weights_j row_j, rows of n one after another */
+void combine(int64_t n, double *to, const double *from, double factor, const double *rows, const double *weights, int count)
+{
+    if (to != from) memcpy(to, from, n * sizeof *to);
+    for (int j = 0; j < count; j++) {
+        const double weight = factor * weights[j], *const restrict row = rows + j * n;
+        double *const restrict sum = to;
+        if (weight != 0)
+            for (int64_t i = 0; i < n; i++) sum[i] += weight * row[i];
+    }
+}
+
 double error_norm(const Run *r, const double *error)
 {
     double sum = 0;

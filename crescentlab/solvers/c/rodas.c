@@ -39,22 +39,15 @@ static double attempt(Run *r, double h)
     const int64_t n = r->n;
     if (!r->linearised) linearise(r, r->t, r->x);
     if (factorise(r, 1 / (gamma_ * h))) return 1 / 0.0;
+    const double *f = r->lin_f;
     for (int s = 0; s < STAGES; s++) {
         double *const u = r->stages + s * n;
-        const double *f = r->lin_f;
         if (s) {
-            for (int64_t i = 0; i < n; i++) {
-                double sum = r->x[i];
-                for (int j = 0; j < s; j++) sum += a[s][j] * r->stages[j * n + i];
-                r->work[i] = sum;
-            }
+            combine(n, r->work, r->x, 1, r->stages, a[s], s);
             f = rhs(r, r->t + c[s] * h, r->work);
         }
-        for (int64_t i = 0; i < n; i++) {
-            double sum = 0;
-            for (int j = 0; j < s; j++) sum += C[s][j] * r->stages[j * n + i];
-            u[i] = f[i] + sum / h + h * d[s] * r->lin_t[i];
-        }
+        for (int64_t i = 0; i < n; i++) u[i] = f[i] + h * d[s] * r->lin_t[i];
+        combine(n, u, u, 1 / h, r->stages, C[s], s);
         solve(r, u);
     }
     const double *const error = r->stages + (STAGES - 1) * n;
@@ -65,15 +58,17 @@ static double attempt(Run *r, double h)
 static void finish(Run *r, double h)
 {
     const int64_t n = r->n;
+    double *const c0 = r->coef, *const c1 = c0 + n, *const c2 = c1 + n, *const c3 = c2 + n;
+    for (int64_t i = 0; i < n; i++) c1[i] = c3[i] = 0;
+    combine(n, c1, c1, 1, r->stages, dense[0], STAGES - 1);
+    combine(n, c3, c3, 1, r->stages, dense[1], STAGES - 1);
     for (int64_t i = 0; i < n; i++) {
-        double bend[2] = {0, 0};
-        for (int k = 0; k < 2; k++)
-            for (int j = 0; j < STAGES - 1; j++) bend[k] += dense[k][j] * r->stages[j * n + i];
-        r->coef[i] = r->x[i];
-        r->coef[n + i] = r->x_new[i] - r->x[i] + bend[0];
-        r->coef[2 * n + i] = bend[1] - bend[0];
-        r->coef[3 * n + i] = -bend[1];
-        r->rate_new[i] = (r->x_new[i] - r->x[i] - bend[0] - bend[1]) / h;
+        const double bend0 = c1[i], bend1 = c3[i], rise = r->x_new[i] - r->x[i];
+        c0[i] = r->x[i];
+        c1[i] = rise + bend0;
+        c2[i] = bend1 - bend0;
+        c3[i] = -bend1;
+        r->rate_new[i] = (rise - bend0 - bend1) / h;
     }
     r->rate_exact = 0;
 }

@@ -211,6 +211,7 @@ extern const Method rodas, dopri;
 const double *rhs(Run *r, double t, const double *x);
 void linearise(Run *r, double t, const double *x);
 double error_norm(const Run *r, const double *error);
+void combine(int64_t n, double *to, const double *from, double factor, const double *rows, const double *weights, int count);
 int factorise(Run *r, double shift);
 void solve(const Run *r, double *v);
 
