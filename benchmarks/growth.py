@@ -29,11 +29,13 @@ from crescentlab.elaborate import elaborate
 from crescentlab.graph import build
 from crescentlab.library import installed
 from crescentlab.netlist import Netlist
-from crescentlab.solvers.loop import Options, integrate
+from crescentlab.solvers.integrate import integrate
+from crescentlab.solvers.options import Options
 
 COLUMNS = {
     "reading": "YAML s", "assembly": "assembly s", "assembled": "memory MB", "per_second": "s per s",
     "evaluations": "f evals", "jacobians": "jacobians", "steps": "steps", "run": "with run MB",
+    "rodas": "rodas s/s", "rodas_steps": "its steps",
 }  # fmt: skip
 """What is measured, and its title."""
 FIRST = 100
@@ -67,10 +69,14 @@ def measure(path: Path, stop: float) -> dict[str, float]:
     trajectory = integrate(system, values, Options(stop=stop))
     assert trajectory.complete, trajectory.error
     count = trajectory.statistics
+    used = peak()
+    other = integrate(system, values, Options(stop=stop, solver="rodas", compile=False))
+    assert other.complete, other.error
     return {
         "reading": read - begun, "assembly": assembled - ready, "assembled": memory - imports,
         "per_second": count.wall_s / stop, "evaluations": count.evaluations, "jacobians": count.jacobians,
-        "steps": count.steps, "run": peak() - imports, "nonzeros": system.jacobian_expression.nnz(),
+        "steps": count.steps, "run": used - imports, "rodas": other.statistics.wall_s / stop,
+        "rodas_steps": other.statistics.steps, "nonzeros": system.jacobian_expression.nnz(),
         "instructions": system.rhs.function.n_instructions(), "imports": imports,
     }  # fmt: skip
 

@@ -1,142 +1,157 @@
-"""One revolution of the crescent pump, all solvers, against the same run over a C build of its functions.
+"""The crescent pump with all solvers, time beside error, against the limit; and where the time of the fastest goes.
 
-    python benchmarks/pump.py [--rounds 3]
+    python benchmarks/pump.py [--revolutions 10] [--rounds 3] [--points 4]
 
-Prints what a run costs (wall time of the integration, evaluations, events, restarts), how far its delivery pressure
-is from a tight reference, and the ratio to the same integration over compiled functions. The runs of a ratio are
-interleaved, for a machine's speed drifts; quote ratios, not seconds. Needs a C compiler for the ratios only.
+The limit is the same circuit written by hand as flat C with a loop of its own (benchmarks/limit). Times are wall times
+of the integration in milliseconds per revolution, from the circuit's start; runs are interleaved, the least of the
+rounds counts. Errors are the largest difference of the delivery pressure on a grid of 10 us to a reference at 1e-8, over its
+mean. Needs a C compiler.
 """
 
 from __future__ import annotations
 
 import argparse
-import shutil
-import statistics
-import subprocess
-import sys
-import tempfile
-import time
-from pathlib import Path
+import timeit
+from collections.abc import Callable
+from typing import Any
 
-import casadi as ca
-import chains
 import numpy as np
+from limit import run as limit_run
 
 import crescentlab as cl
-from crescentlab.assembly import assemble
-from crescentlab.causality import plan
-from crescentlab.circuit import Circuit
-from crescentlab.elaborate import elaborate
-from crescentlab.graph import build
-from crescentlab.library import installed
-from crescentlab.netlist import Netlist
-from crescentlab.prepared import Prepared
-from crescentlab.system import System
+from crescentlab.result import Result
+from crescentlab.solvers.compiled import _CompiledRun
+from crescentlab.solvers.integrate import integrate
+from crescentlab.solvers.options import Options
 
-SOLVERS = ("lsoda", "rk45", "dop853", "bdf", "radau", "cvode")
-REVOLUTION = "30 ms"
 GRID = 1e-5
-FUNCTIONS = ("rhs", "jacobian", "relation", "condition", "remap")
+POINTS = {
+    "2000 rpm, 3 bar": ("2000 rpm", "24.6 mm^2"), "4000 rpm, 6 bar": ("4000 rpm", "37.17 mm^2"),
+    "2000 rpm, throttle closed": ("2000 rpm", "0 mm^2"), "4000 rpm, throttle closed": ("4000 rpm", "0 mm^2"),
+}  # fmt: skip
+RUNS = (
+    ("rodas", 1e-3, True), ("rodas", 1e-3, False), ("dopri", 1e-4, True), ("dopri", 1e-4, False), ("auto", 1e-4, None),
+    ("lsoda", 1e-4, False), ("rk45", 1e-4, False), ("dop853", 1e-4, False), ("bdf", 1e-4, False),
+    ("radau", 1e-4, False), ("cvode", 1e-4, False), ("rk45", 1e-4, True),
+)  # fmt: skip
+"""Solver, relative tolerance, whether its functions are compiled."""
 
 
-def assembly_seconds(netlist: Netlist) -> float:
-    """Best of three: netlist to assembled system with right-hand side and Jacobian expressions."""
-    library = installed()
-    found = []
-    for _ in range(3):
-        begun = time.perf_counter()
-        assemble(plan(build(elaborate(netlist, library)), library))
-        found.append(time.perf_counter() - begun)
-    return min(found)
+class Pump:
+    """The circuit at one operating point."""
+
+    def __init__(self, speed: str, area: str, revolutions: int) -> None:
+        circuit = cl.load("crescent_pump")
+        self.settings = {"speed": speed, "throttle_area": area}
+        self.design = circuit.design(self.settings)
+        self.system = circuit.system(self.settings)
+        self.values = self.system.values(self.design)
+        self.revolutions = revolutions
+        self.stop = revolutions * 60 / float(speed.split()[0])
+
+    def options(self, solver: str, rtol: float, compile: bool | None) -> Options:
+        """What a run is asked for."""
+        return Options(stop=self.stop, solver=solver, rtol=rtol, compile=compile, output_step=GRID)
+
+    def run(self, solver: str, rtol: float, compile: bool | None) -> tuple[float, np.ndarray, Any]:
+        """Milliseconds per revolution, delivery pressure on the grid, trajectory."""
+        trajectory = integrate(self.system, self.values, self.options(solver, rtol, compile))
+        result = Result(self.system, self.values, self.design, trajectory)
+        return 1e3 * trajectory.statistics.wall_s / self.revolutions, result["delivery.p"], trajectory
+
+    def limit(self, method: str, rtol: float) -> tuple[float, np.ndarray]:
+        """The same of the flat C."""
+        found = limit_run(self.revolutions, rtol, method, **self.settings)
+        return 1e3 * found.seconds / self.revolutions, found.delivery
 
 
-def compiled(circuit: Circuit, folder: Path) -> Circuit | None:
-    """The same circuit with its functions replaced by a bare C build; None without a compiler."""
-    compiler = shutil.which("cc") or shutil.which("gcc")
-    if compiler is None:
-        return None
-    other = cl.load("crescent_pump")
-    system: System = other.system()
-    generator = ca.CodeGenerator("pump.c")
-    for name in FUNCTIONS:
-        generator.add(getattr(system, name).function)
-    generator.generate(f"{folder}/")
-    library = folder / "pump.so"
-    subprocess.run([compiler, "-O3", "-shared", "-fPIC", str(folder / "pump.c"), "-o", str(library), "-lm"], check=True)
-    for name in FUNCTIONS:
-        prepared = getattr(system, name)
-        bare = ca.external(prepared.function.name(), str(library))
-        vars(system)[name] = Prepared(bare, prepared.parameters)
-    return other
+def error(pressure: np.ndarray, exact: np.ndarray) -> float:
+    """Largest difference over the mean."""
+    n = min(pressure.size, exact.size)
+    return float(np.max(np.abs(pressure[:n] - exact[:n])) / np.mean(exact))
 
 
-def run(circuit: Circuit, solver: str, rtol: float) -> tuple[float, np.ndarray, object]:
-    """Wall time of the integration, delivery pressure on the grid, statistics."""
-    result = circuit.simulate(stop=REVOLUTION, solver=solver, rtol=rtol, output_step=GRID)
-    return result.trajectory.statistics.wall_s, result["delivery.p"], result.trajectory.statistics
+def table(name: str, pump: Pump, rounds: int) -> None:
+    """All solvers at one point, interleaved."""
+    exact = pump.run("dopri", 1e-8, True)[1]
+    print(f"\n{name}: limit and circuit at 1e-7 differ by {error(pump.limit('rodas', 1e-7)[1], exact):.1e}")
+    limits = {("limit, rodas", 1e-3): ("rodas", 1e-3), ("limit, dopri", 1e-4): ("dopri", 1e-4)}
+    best: dict[Any, float] = {}
+    shown: dict[Any, tuple[Any, ...]] = {}
+    for _ in range(rounds):
+        for key, (method, rtol) in limits.items():
+            ms, pressure = pump.limit(method, rtol)
+            best[key] = min(best.get(key, ms), ms)
+            shown[key] = (key[0], rtol, error(pressure, exact), "", "", "", "")
+        for solver, rtol, compile in RUNS:
+            ms, pressure, done = pump.run(solver, rtol, compile)
+            key = (solver, rtol, compile)
+            best[key] = min(best.get(key, ms), ms)
+            s, n = done.statistics, pump.revolutions
+            label = done.solver if solver == "auto" else f"{solver}{', compiled' if compile else ''}"
+            counts = (s.steps / n, s.evaluations / n, s.jacobians / n, s.restarts / n)
+            shown[key] = (label.partition(" (c")[0], rtol, error(pressure, exact), *[f"{c:.0f}" for c in counts])
+    floor = best["limit, rodas", 1e-3]
+    print("solver             rtol   ms/rev     error   steps  evals   Jac. restarts   ratio to limit")
+    for key, row in shown.items():
+        print(
+            f"{row[0]:17s} {row[1]:.0e} {best[key]:8.2f} {row[2]:9.1e} {row[3]:>7s} {row[4]:>6s} {row[5]:>6s} "
+            f"{row[6]:>8s}{best[key] / floor:12.2f}"
+        )
 
 
-def seconds(command: list[str]) -> float:
-    """Wall time of a process."""
-    begun = time.perf_counter()
-    subprocess.run(command, check=True, stdout=subprocess.DEVNULL)
-    return time.perf_counter() - begun
+def shares(pump: Pump) -> None:
+    """Where the time of compiled rodas goes: each call timed alone, times how often it is made."""
+    options = pump.options("rodas", 1e-3, True)
+    totals = [_CompiledRun(pump.system, pump.values, options, None).run().statistics.wall_s for _ in range(5)]
+    run = _CompiledRun(pump.system, pump.values, options, None)
+    s = run.run().statistics
+    whole, n = 1e6 * min(totals), pump.revolutions
 
+    def micro(call: Callable[[], object]) -> float:
+        return 1e6 * min(timeit.repeat(call, number=1000, repeat=9)) / 1000
 
-def start_up(rounds: int) -> None:
-    """Start-up of the command line beside a bare import of numpy, interleaved."""
-    python = sys.executable
-    commands = {
-        "import numpy": [python, "-c", "import numpy"],
-        "crescentlab --help": [python, "-m", "crescentlab", "--help"],
-        "crescentlab check crescent_pump": [python, "-m", "crescentlab", "check", "crescent_pump"],
-    }
-    times: dict[str, list[float]] = {name: [] for name in commands}
-    for _ in range(2 * rounds + 1):
-        for name, command in commands.items():
-            times[name].append(seconds(command))
-    numpy = times["import numpy"]
-    print("\nstart-up                           median s   ratio to import numpy")
-    for name, found in times.items():
-        ratio = statistics.median(a / b for a, b in zip(found, numpy, strict=True))
-        print(f"{name:32s} {statistics.median(found):10.3f} {ratio:10.2f}")
+    stops = s.events + s.ticks
+    calls = {
+        "f": ("rhs", s.evaluations), "f, df/dx, df/dt": ("linear", s.jacobians), "ticks": ("remap_ticks", s.ticks),
+        "events": ("remap_events", s.events), "relations at stops": ("relation", 2 * s.events + s.ticks),
+        "relations at steps": ("relation_on_state", s.steps), "conditions": ("condition", 2 * stops),
+    }  # fmt: skip
+    costs = {label: count * micro(run.evaluators[name][0].trigger) for label, (name, count) in calls.items()}
+    library, given = run.library, run.run_
+    import ctypes
+
+    idle = micro(library.size_of_run)
+    vector = np.zeros(given.n)
+    pointer, structure = ctypes.c_void_p(vector.ctypes.data), ctypes.byref(given)
+    factorise = micro(lambda: library.factorise(structure, ctypes.c_double(1e5))) - idle
+    solve = micro(lambda: library.solve(structure, pointer)) - idle
+    costs["linear algebra"] = s.factorisations * (factorise + 6 * solve)
+    begun = timeit.default_timer()
+    run.rows(), run.pieces()
+    costs["Python: records to arrays"] = 1e6 * (timeit.default_timer() - begun)
+    costs["rest: stages, control, roots, records"] = whole - sum(costs.values())
+    print(f"\nwhere the time of compiled rodas goes, {whole / n / 1e3:.2f} ms per revolution")
+    for label, cost in costs.items():
+        print(f"{label:38s} {cost / n / 1e3:6.2f} ms {100 * cost / whole:5.1f} %")
 
 
 def main() -> None:
     """Print the tables."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--revolutions", type=int, default=10)
     parser.add_argument("--rounds", type=int, default=3, help="interleaved runs of each solver")
-    rounds = parser.parse_args().rounds
-
-    pump = cl.load("crescent_pump")
-    print(f"assembly of crescent_pump          {assembly_seconds(pump.netlist):.3f} s")
-    print(f"assembly of 1000 orifices, volumes {assembly_seconds(chains.netlist('chain', 1000)):.3f} s")
-
-    system = pump.system()
+    parser.add_argument("--points", type=int, default=len(POINTS), help="so many operating points")
+    options = parser.parse_args()
+    pumps = {name: Pump(*settings, options.revolutions) for name, settings in list(POINTS.items())[: options.points]}
+    system = next(iter(pumps.values())).system
     print(
         f"states {system.x.numel()}, held {system.h.numel()}, relations {system.b.numel()}; instructions of f "
         f"{system.rhs.function.n_instructions()}, Jacobian nonzeros {system.jacobian_expression.nnz()}"
     )
-    reference = run(pump, "dop853", 1e-10)[1]
-    with tempfile.TemporaryDirectory() as folder:
-        bare = compiled(pump, Path(folder))
-        print(f"\none revolution ({REVOLUTION}) at 2000 rpm, 3 bar, rtol 1e-6; error of delivery.p against rtol 1e-10")
-        print("solver      wall s     error   steps   f evals  events  ticks  restarts   ratio to C functions")
-        for solver in SOLVERS:
-            pairs = []
-            for _ in range(rounds):
-                mine = run(pump, solver, 1e-6)
-                theirs = run(bare, solver, 1e-6)[0] if bare else float("nan")
-                pairs.append((mine[0], theirs))
-            count = mine[2]
-            error = float(np.max(np.abs(mine[1] - reference)) / np.mean(reference))
-            ratio = statistics.median(a / b for a, b in pairs)
-            print(
-                f"{solver:8s} {statistics.median(a for a, _ in pairs):9.3f} {error:9.1e} {count.steps:7d} "
-                f"{count.evaluations:9d} "
-                f"{count.events:7d} {count.ticks:6d} {count.restarts:9d} {ratio:12.2f}"
-            )
-    start_up(rounds)
+    for name, pump in pumps.items():
+        table(name, pump, options.rounds)
+    shares(next(iter(pumps.values())))
 
 
 if __name__ == "__main__":

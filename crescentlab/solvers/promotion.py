@@ -18,10 +18,10 @@ from crescentlab.errors import CompilerError
 from crescentlab.prepared import Evaluator, Prepared
 from crescentlab.system import System
 
-LARGEST = 100_000
+LARGEST = 40_000
 """Functions of more instructions are not compiled: the compiler's time grows faster than they do."""
 SECONDS = 4e-4
-"""What a compiler takes for an instruction (benchmarks/RESULTS.md)."""
+"""What a compiler takes for an instruction, at most."""
 
 
 class Promotion:
