@@ -5,7 +5,7 @@
 #   make check     formatter, linter and types, changing nothing
 #   make format    let the formatter and the linter mend what they can
 #   make campaign  the tests that take minutes of simulation
-#   make bench     the pump's benchmark
+#   make bench     the pump, all solvers, against hand-written C; the other benchmarks: benchmarks/RESULTS.md
 #
 # The first of them makes the virtual environment; later ones start at once until pyproject.toml or
 # constraints.txt changes. The install is editable, so edits are seen without it.

@@ -4,8 +4,8 @@
 
 The limit is the same circuit written by hand as flat C with a loop of its own (benchmarks/limit). Times are wall times
 of the integration in milliseconds per revolution, from the circuit's start; runs are interleaved, the least of the
-rounds counts. Errors are the largest difference of the delivery pressure on a grid of 10 us to a reference at 1e-8, over its
-mean. Needs a C compiler.
+rounds counts. Errors are the largest difference of the delivery pressure on a grid of 10 us to a reference at 1e-8,
+over its mean. Needs a C compiler.
 """
 
 from __future__ import annotations

@@ -230,6 +230,8 @@ def test_constraints_pin_every_dependency() -> None:
 
 def test_a_check_waits_for_no_solver() -> None:
     """`check`, `components` and `graph` integrate nothing: they start a third of a second sooner without SciPy."""
-    code = "import sys; import crescentlab.commands.check, crescentlab.commands.components; print('scipy' in sys.modules)"
+    code = (
+        "import sys; import crescentlab.commands.check, crescentlab.commands.components; print('scipy' in sys.modules)"
+    )
     run = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert run.stdout.strip() == "False"

@@ -27,7 +27,7 @@ from crescentlab.system import System, Values
 SMALLEST_STEP = 1e-14
 """Steps below this share of the span, many in a row, are a collapse."""
 COLLAPSE_COUNT = 500
-MANY_STEPS = 30_000
+MANY_STEPS = 20_000
 """So many steps of SciPy's take longer than building the compiled loop and what it then needs."""
 FIRST_COUNT = 1000
 """After so many steps, and every time they have doubled, those ahead are counted."""
