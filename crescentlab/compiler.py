@@ -12,6 +12,7 @@ import os
 import platform
 import shlex
 import shutil
+import signal
 import subprocess
 import tempfile
 import threading
@@ -107,7 +108,9 @@ def build(source: Source, job: Job | None = None) -> Path:
                 Path(folder, name).write_text(text, encoding="utf-8")
             units = [name for name in source.texts if name.endswith(".c")]
             called = [*command(), *source.flags, *units, "-o", "made.so", "-lm"]
-            running = subprocess.Popen(called, cwd=folder, text=True, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE)
+            running = subprocess.Popen(
+                called, cwd=folder, text=True, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, start_new_session=True
+            )
             if job is not None:
                 job.process = running
             said = running.communicate()[1]
@@ -145,8 +148,19 @@ class Job(threading.Thread):
         self.cancelled = True
         while self.is_alive():
             if self.process is not None:
-                self.process.terminate()
+                _kill(self.process)
             self.join(0.05)
+
+
+def _kill(process: subprocess.Popen[str]) -> None:
+    """End a compiler and the passes it has started."""
+    try:
+        if hasattr(os, "killpg"):
+            os.killpg(process.pid, signal.SIGKILL)  # its own session, hence its own group
+        else:
+            process.kill()
+    except ProcessLookupError:
+        pass
 
 
 def _first_error(text: str) -> str:

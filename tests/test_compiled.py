@@ -6,6 +6,7 @@ from __future__ import annotations
 import ctypes
 import os
 import stat
+import time
 from pathlib import Path
 
 import casadi as ca
@@ -272,7 +273,8 @@ def test_what_the_cache_has_is_used_unasked(own_cache):
 def test_a_long_run_is_compiled_beside_itself(own_cache, monkeypatch):
     """Once compiling pays, functions change over in the middle of a run, and nobody can tell from its numbers."""
     monkeypatch.setattr(promotion, "SECONDS", 1e-9)
-    monkeypatch.setattr("crescentlab.solvers.compiled.LOOK", 0.0)
+    monkeypatch.setattr(promotion, "PATIENCE", 0.0)
+    monkeypatch.setattr("crescentlab.solvers.compiled.LOOK", 1e-4)
 
     def long_run(compile):
         made = circuit(components=PARTS, nets=NETS, fluid=OIL)
@@ -286,8 +288,11 @@ def test_a_long_run_is_compiled_beside_itself(own_cache, monkeypatch):
 def test_a_run_that_ends_first_stops_its_compiler(own_cache, monkeypatch):
     """Nobody waits for a compiler whose work is no longer needed, and it leaves nothing behind."""
     monkeypatch.setattr(promotion, "SECONDS", 1e-9)
-    monkeypatch.setattr("crescentlab.solvers.compiled.LOOK", 0.0)
+    monkeypatch.setattr(promotion, "PATIENCE", 0.0)
+    monkeypatch.setattr("crescentlab.solvers.compiled.LOOK", 1e-4)
+    begun = time.perf_counter()
     cl.load("crescent_pump").simulate(stop="40 ms", solver="rodas")
+    assert time.perf_counter() - begun < 5  # left alone, the compiler takes twice as long
     assert [path for path in own_cache.iterdir() if path.is_dir()] == []
 
 

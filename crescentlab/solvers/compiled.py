@@ -6,7 +6,6 @@ Stepping, error control, roots, remaps and ticks are C (``c/*.c``); Python is ca
 from __future__ import annotations
 
 import ctypes
-import itertools
 import time
 from collections.abc import Callable
 
@@ -24,14 +23,18 @@ from crescentlab.solvers.limits import PressureLimits
 from crescentlab.solvers.options import ANGLE_STEP, RESTART_SHARE, Options
 from crescentlab.solvers.pace import CLOCK_SWING, clock_pace
 from crescentlab.solvers.promotion import Promotion
+from crescentlab.solvers.records import Records, on_grid
 from crescentlab.solvers.roots import waves
-from crescentlab.solvers.trajectory import Happening, Polynomials, Rows, Statistics, Trajectory
+from crescentlab.solvers.trajectory import Statistics, Trajectory
 from crescentlab.system import System, Values
 
 LOOK = 0.1
 """Seconds between two signs of progress."""
-BLOCK = 1000
-"""Most steps between two looks of Python, which shows progress and hears an interruption."""
+FIRST_BLOCK = 500
+"""Steps before Python first looks in; later about as many as take LOOK, and never more than ..."""
+MOST_BLOCK = 100_000
+SAVING = 0.6
+"""Share of a run that compiled functions save."""
 FIELDS = {
     "rhs": "rhs", "linear": "linear", "relation": "relation", "relation_on_state": "watch", "condition": "condition",
     "remap": "remap", "remap_ticks": "remap_ticks", "remap_events": "remap_events",
@@ -40,13 +43,15 @@ FIELDS = {
 OUTPUTS = {
     "rhs": ("fx",), "linear": ("lin_f", "jacobian", "lin_t"), "relation": ("g", "g_rate", "g_scale"),
     "relation_on_state": ("w", "w_rate", "w_scale"), "condition": ("conditions",),
+    **dict.fromkeys(("remap", "remap_ticks", "remap_events"), ("new_x", "new_h")),
 }  # fmt: skip
-"""Fields of their outputs; remaps write new_x and new_h."""
-SAVING = 0.6
-"""Share of a run that compiled functions save."""
-COMMON = ("rhs", "relation", "relation_on_state", "condition", "remap", "remap_ticks", "remap_events")
-FUNCTIONS = {"rodas": (*COMMON, "linear"), "dopri": COMMON}
-"""Functions of the system that each method calls."""
+"""Fields of their results."""
+
+
+def called(system: System, solver: str) -> list[str]:
+    """Functions of the system that a run with this method calls."""
+    names = [name for name in FIELDS if solver == "rodas" or name != "linear"]
+    return [name for name in names if system.events or not name.startswith("remap")]
 
 
 def integrate(
@@ -76,21 +81,20 @@ class _CompiledRun:
         self.system, self.values, self.options, self.progress = system, values, options, progress
         self.library = native.library()
         self.warnings: list[str] = []
-        self.promotion = Promotion(system, FUNCTIONS[options.solver], options.compile, SAVING)
+        self.promotion = Promotion(system, called(system, options.solver), options.compile, SAVING)
         self.warnings += [notice] if (notice := self.promotion.before()) else []
         self.hybrid = Hybrid(system, values, options.start, options.stop)
         self.atol = options.rtol * system.nominal
         self.diagnosis = Diagnosis(Functions(system, values), options.rtol, self.atol)
         self.limits = PressureLimits(system)
         self.tension: str | None = None
-        self.blocks: list[dict[str, np.ndarray]] = []
         self.run_ = native.Run()
         self.set_sizes()
         self.set_functions()
         self.set_relations_and_events()
         self.set_task()
         self.set_scratch()
-        self.set_records()
+        self.records = Records(self.run_, options.solver)
 
     # -- what the loop reads ---------------------------------------------------------------------
 
@@ -113,30 +117,18 @@ class _CompiledRun:
         r.trigger = native.call_function()
         self.evaluators: dict[str, list[Evaluator]] = {}
         new = [_room(r.n), _room(r.n_held)]
-        r.give(new_x=new[0], new_h=new[1])
-        self.fields = dict(FIELDS)
-        if self.options.solver != "rodas":
-            self.fields.pop("linear")
-        if not system.events:
-            self.fields = {name: field for name, field in self.fields.items() if not name.startswith("remap")}
-        more = {
-            "relation": [v],
-            "relation_on_state": [v],
-            "remap": [flags],
-            "remap_ticks": [flags],
-            "remap_events": [flags],
-        }
-        for name in self.fields:
-            outputs = new if name.startswith("remap") else None
-            evaluator = Evaluator(self.promotion.take(name), p, [t, x, h, b, *more.get(name, [])], outputs)
+        for name in called(system, self.options.solver):
+            remaps = name.startswith("remap")
+            more = [flags] if remaps else [v] if name.startswith("relation") else []
+            evaluator = Evaluator(self.promotion.take(name), p, [t, x, h, b, *more], new if remaps else None)
             self.evaluators[name] = [evaluator]
-            r.give(**dict(zip(OUTPUTS.get(name, ()), evaluator.outputs, strict=False)))
+            r.give(**dict(zip(OUTPUTS[name], evaluator.outputs, strict=True)))
         self.set_addresses()
 
     def set_addresses(self) -> None:
         """Tell the loop where its functions are."""
-        for name, field in self.fields.items():
-            setattr(self.run_, field, native.address_of(self.evaluators[name][0].buffer))
+        for name, (evaluator,) in self.evaluators.items():
+            setattr(self.run_, FIELDS[name], native.address_of(evaluator.buffer))
 
     def set_relations_and_events(self) -> None:
         r, hybrid, system = self.run_, self.hybrid, self.system
@@ -189,22 +181,6 @@ class _CompiledRun:
             )  # fmt: skip
             r.nonzeros = found.place.size
 
-    def set_records(self) -> None:
-        r = self.run_
-        size = native.SHAPES[self.options.solver][1] + 1
-        width = 8 * ((size + 1) * r.n + 2 * (r.n_held + r.n_bits) + 8)
-        rows = self.rows_max = max(16, min(2 * BLOCK, native.ROWS_BYTES // width))
-        logs = 2 * native.LIMITS["MAX_ROUNDS"] * (r.n_events + 1) + rows
-        self.records = {
-            "row_t": np.zeros(rows), "row_x": np.zeros((rows, r.n)), "row_jump": np.zeros(rows, np.int64),
-            "row_world": np.zeros(rows, np.int64), "piece_low": np.zeros(rows), "piece_high": np.zeros(rows),
-            "piece_coef": np.zeros((rows, size, r.n)), "piece_world": np.zeros(rows, np.int64),
-            "world_h": np.zeros((2 * rows, r.n_held)), "world_b": np.zeros((2 * rows, r.n_bits)),
-            "log_t": np.zeros(logs), "log_event": np.zeros(logs, np.int64),
-        }  # fmt: skip
-        r.rows_max, r.logs_max = rows, logs
-        r.give(**self.records)
-
     # -- the run ---------------------------------------------------------------------------------
 
     def run(self) -> Trajectory:
@@ -225,20 +201,26 @@ class _CompiledRun:
             steps=r.steps, evaluations=r.evaluations, jacobians=r.jacobians, events=r.events, ticks=r.ticks,
             restarts=r.restarts, rejected=r.rejected, factorisations=r.factorisations, wall_s=wall,
         )  # fmt: skip
-        steps, pieces = self.rows(), self.pieces()
+        values, names = self.values, [event.name for event in self.system.events]
+        at_start = (self.options.start, values.x0, values.h0, np.zeros(r.n_bits))
+        steps, pieces = self.records.rows(at_start), self.records.pieces()
+        step = self.options.output_step
         functions = "compiled" if self.promotion.compiled else "interpreted"
         return Trajectory(
-            steps=steps, grid=self.grid(steps, pieces) if self.options.output_step else None,
-            happenings=self.happenings(), statistics=statistics, pieces=pieces,
+            steps=steps, grid=on_grid(self.options.start, step, r.tolerance, steps, pieces) if step else None,
+            happenings=self.records.happenings(names), statistics=statistics, pieces=pieces,
             solver=f"{self.options.solver} (compiled loop, {functions} functions)",
             status=status, error=error, warnings=self.warnings,
         )  # fmt: skip
 
     def advance(self) -> str:
         """Call the loop until it is done; the status. Raises what it failed on."""
-        r = self.run_
+        r, block = self.run_, FIRST_BLOCK
         while True:
-            code = native.NAMES[self.library.advance(ctypes.byref(r), BLOCK)]
+            called = time.perf_counter()
+            code = native.NAMES[self.library.advance(ctypes.byref(r), block)]
+            pause = max(time.perf_counter() - called, 1e-6)
+            block = max(1, min(2 * block, MOST_BLOCK, round(block * LOOK / pause)))
             self.hybrid.h, self.hybrid.b = r.kept["h"][: r.n_held].copy(), r.kept["b"][: r.n_bits].copy()
             self.drain()
             if code in ("DONE", "STOPPED"):
@@ -273,6 +255,17 @@ class _CompiledRun:
         """States where the loop stands."""
         return self.run_.kept["x"][: self.run_.n].copy()
 
+    def drain(self) -> None:
+        """Take what was recorded, and look whether fluids that may were under tension."""
+        block = self.records.drain()
+        if block is None or self.tension or not any(self.limits.states[3]):
+            return
+        below = np.flatnonzero((block["row_x"] < self.limits.states[1]).any(axis=1))
+        if below.size:
+            k = int(below[0])
+            self.tension = self.limits.look(float(block["row_t"][k]), block["row_x"][k], *self.limits.states)
+            self.warnings += [self.tension] if self.tension else []
+
     # -- failures --------------------------------------------------------------------------------
 
     def fail(self, code: str) -> None:
@@ -292,7 +285,7 @@ class _CompiledRun:
             hybrid.raise_zeno(self.system.events[r.culprit].name, t - float(times.min()))
         self.diagnosis.functions.h, self.diagnosis.functions.b = hybrid.h, hybrid.b
         if code == "NOT_FINITE":
-            when = "after an event" if self.blocks and r.events + r.ticks else ""
+            when = "after an event" if r.events + r.ticks else ""
             self.diagnosis.check_finite(t, x, x, when)
             self.diagnosis.check_held(t, hybrid.h, self.last_events(1))
             self.diagnosis.check_finite(t, x, self.diagnosis.functions.rhs(t, x), "" if r.steps else "at the start")
@@ -305,12 +298,11 @@ class _CompiledRun:
 
     def last_events(self, count: int) -> list[str]:
         """Names of the last events, each once."""
-        fired = np.concatenate([block["log_event"] for block in self.blocks])[-count:]
-        return list(dict.fromkeys(self.system.events[k].name for k in fired.tolist()))
+        return list(dict.fromkeys(self.system.events[k].name for k in self.records.events()[-count:]))
 
     def keep_possible(self) -> None:
         """End the run at the last instant of its last step at which all pressures were possible, and say why."""
-        block, steps = self.blocks[-1], self.pieces()
+        steps = self.records.pieces()
         last = np.array([steps.low.size - 1])
         low, high = float(steps.low[-1]), float(steps.high[-1])
         failure: SimulationError | None = None
@@ -326,91 +318,10 @@ class _CompiledRun:
             self.limits.check(high, self.x, self.hybrid.h)
         except SimulationError as problem:
             failure = problem
-        block["piece_high"][-1] = block["row_t"][-1] = self.run_.t = a
-        block["row_x"][-1] = steps.at(last, np.array([a]))[0]
+        self.run_.t = a
+        self.records.shorten(a, steps.at(last, np.array([a]))[0])
         assert failure is not None
         raise failure
-
-    # -- what the loop recorded ------------------------------------------------------------------
-
-    def drain(self) -> None:
-        """Take what was recorded; the loop begins anew with empty records."""
-        r = self.run_
-        counts = {"row": r.rows, "piece": r.pieces, "world": r.worlds, "log": r.logs}
-        if not r.rows and not r.logs:
-            return
-        block = {name: array[: counts[name.partition("_")[0]]].copy() for name, array in self.records.items()}
-        low, high = block["piece_low"], block["piece_high"]
-        block["piece_length"] = high - low
-        self.blocks.append(block)
-        r.rows = r.pieces = r.worlds = r.logs = 0
-        if not self.tension and any(self.limits.states[3]):
-            self.warn(block)
-
-    def warn(self, block: dict[str, np.ndarray]) -> None:
-        """The first pressure under tension where the fluid allows it."""
-        below = np.flatnonzero((block["row_x"] < self.limits.states[1]).any(axis=1))
-        if below.size:
-            k = int(below[0])
-            warning = self.limits.look(float(block["row_t"][k]), block["row_x"][k], *self.limits.states)
-            self.tension = warning
-            self.warnings += [warning] if warning else []
-
-    def joined(self, name: str) -> np.ndarray:
-        return np.concatenate([block[name] for block in self.blocks])
-
-    def of_world(self, of: str, kind: str) -> np.ndarray:
-        return np.concatenate([block[kind][block[of]] for block in self.blocks])
-
-    def rows(self) -> Rows:
-        """Accepted steps and events."""
-        if not self.blocks:
-            v = self.values
-            return Rows(
-                np.array([self.options.start]), v.x0[None], v.h0[None], np.zeros((1, self.run_.n_bits)), _whole([])[:0]
-            )
-        return Rows(
-            self.joined("row_t"), self.joined("row_x"), self.of_world("row_world", "world_h"),
-            self.of_world("row_world", "world_b"), np.flatnonzero(self.joined("row_jump")),
-        )  # fmt: skip
-
-    def pieces(self) -> Polynomials:
-        """The polynomials of the accepted steps."""
-        if not self.blocks:
-            r, none = self.run_, np.zeros(0)
-            return Polynomials(
-                none, none, none, np.zeros((0, 1, r.n)), np.zeros((0, r.n_held)), np.zeros((0, r.n_bits))
-            )
-        return Polynomials(
-            self.joined("piece_low"), self.joined("piece_high"), self.joined("piece_length"),
-            self.joined("piece_coef"), self.of_world("piece_world", "world_h"), self.of_world("piece_world", "world_b"),
-        )  # fmt: skip
-
-    def happenings(self) -> list[Happening]:
-        """Events and ticks by instant."""
-        if not self.blocks:
-            return []
-        names = [event.name for event in self.system.events]
-        pairs = zip(self.joined("log_t").tolist(), self.joined("log_event").tolist(), strict=True)
-        return [
-            Happening(t, tuple(names[k] for _, k in group)) for t, group in itertools.groupby(pairs, key=lambda p: p[0])
-        ]
-
-    def grid(self, steps: Rows, pieces: Polynomials) -> Rows:
-        """The uniform output grid, the end of the run its last row; at an event the values after it."""
-        o, end = self.options, float(steps.t[-1])
-        assert o.output_step is not None
-        times = o.start + o.output_step * np.arange(np.floor((end - o.start) / o.output_step * (1 + 1e-12)) + 1)
-        times = times[times < end - self.hybrid.time_tolerance]
-        if not pieces.low.size:
-            times = times[:0]
-        inside = np.clip(np.searchsorted(pieces.low, times + self.hybrid.time_tolerance, side="right") - 1, 0, None)
-        last = -1
-        return Rows(
-            np.append(times, end), np.vstack([pieces.at(inside, times), steps.x[last:]]),
-            np.vstack([pieces.h[inside], steps.h[last:]]), np.vstack([pieces.b[inside], steps.b[last:]]),
-            np.zeros(0, int),
-        )  # fmt: skip
 
 
 def _room(size: int) -> np.ndarray:

@@ -20,8 +20,6 @@ from crescentlab.errors import CompilerError
 
 SOURCES = ("run.h", "loop.c", "lu.c", "rodas.c", "dopri.c")
 OPTIMISED = ("-O3", *NATIVE[1:])
-ROWS_BYTES = 8_000_000
-"""About how much is recorded before Python empties the records."""
 CALL_FUNCTION = "_ZN6casadi21_function_buffer_evalEPv"
 """CasADi's ``void _function_buffer_eval(void *)``: evaluates a function through its buffers, no Python involved."""
 

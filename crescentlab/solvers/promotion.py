@@ -20,6 +20,8 @@ from crescentlab.system import System
 
 LARGEST = 40_000
 """Functions of more instructions are not compiled: the compiler's time grows faster than they do."""
+PATIENCE = 0.3
+"""Seconds of a run before what is left of it is guessed."""
 SECONDS = 4e-4
 """What a compiler takes for an instruction, at most."""
 
@@ -93,6 +95,8 @@ class Promotion:
         if self.wanted is not None or not self.sources:
             return False
         if self.job is None:
+            if elapsed < PATIENCE:
+                return False
             left = elapsed * (1 - share) / share if share > 0 else 0.0
             if self.saving * (left - self.seconds) > self.seconds:
                 self.job = compiler.Job(self.sources)
