@@ -5,7 +5,7 @@
 The pump turns twice at 2000 rpm and 3 bar; the stiff circuit is the row of twenty volumes of 20 cm3 behind a pulsating
 source, whose orifices empty a volume in some microseconds. Each solver runs at several tolerances; times are wall times
 of the integration, the least of the interleaved rounds; errors are the largest differences on a grid of 2000 points to
-dop853 or radau at 1e-10, in shares of the mean: of the pump's delivery and suction pressure and that before its
+dopri or radau at 1e-10, in shares of the mean: of the pump's delivery and suction pressure and that before its
 throttle (others jump at events, where a grid point may see either side), of the row's every pressure. Compiled means
 --compile.
 """
@@ -39,7 +39,7 @@ COLOURS = dict(
 )
 CASES = {
     "Crescent pump, two revolutions at 2000 rpm": (
-        lambda: cl.load("crescent_pump"), 0.06, "dop853", ("delivery.p", "suction.p", "line.body.p"),
+        lambda: cl.load("crescent_pump"), 0.06, "dopri", ("delivery.p", "suction.p", "line.body.p"),
     ),
     "Row of twenty volumes, stiff, 20 ms": (
         lambda: Circuit(netlist("chain", 20)), 0.02, "radau", tuple(f"v{k}.p" for k in range(20)),

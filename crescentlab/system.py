@@ -104,6 +104,7 @@ class System:
     _remap: Callable[[list[bool]], tuple[ca.SX, list[ca.SX]]]
     _contents: dict[str, tuple[Callable[[], ca.SX], Callable[[], tuple[ca.SX, ca.SX]]]]
     _functions: dict[Any, ca.Function] = field(default_factory=dict)
+    _once: dict[str, Any] = field(default_factory=dict)
     built: dict[tuple[str, str], Prepared] = field(default_factory=dict)
     """Functions that have been compiled, by name and form (see :mod:`crescentlab.solvers.promotion`)."""
 
@@ -181,6 +182,12 @@ class System:
     def period(self) -> ca.Function:
         """Periods of the ticks, from p alone."""
         return ca.Function("period", [self.p], [ca.densify(self.periods)])
+
+    def once(self, key: str, make: Callable[[], Any]) -> Any:
+        """What ``make`` returns the first time: things that depend on the structure alone, kept from run to run."""
+        if key not in self._once:
+            self._once[key] = make()
+        return self._once[key]
 
     def find(self, name: str) -> Variable:
         """The variable called ``name``; raises :class:`InputError` offering the nearest."""

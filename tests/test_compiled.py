@@ -180,8 +180,11 @@ def test_a_chain_brings_no_fill():
 
 
 @pytest.mark.parametrize("solver", ["rodas", "dopri", "lsoda", "radau"])
-def test_what_the_cache_has_changes_no_bit(solver, own_cache):
+def test_what_the_cache_has_changes_no_bit(solver, own_cache, monkeypatch):
     """The same operations in the same order: equal to the last bit, or the cache's state would be seen in results."""
+    monkeypatch.setattr(promotion, "PATIENCE", 0.0)
+    monkeypatch.setattr("crescentlab.solvers.compiled.LOOK", 0.0)
+    monkeypatch.setattr("crescentlab.solvers.loop.LOOK", 0.0)
     system = cl.load("relief_valve").system()
     for name in ("rhs", "jacobian", "linear", "relation", "relation_on_state", "condition", "remap", "remap_events"):
         compiler.build(promotion.Promotion(system, [name], None, 0.5).source(name))
@@ -259,15 +262,20 @@ def test_another_value_needs_no_compiler(own_cache, monkeypatch):
     assert not result.trajectory.warnings
 
 
-def test_what_the_cache_has_is_used_unasked(own_cache):
-    """The second process pays nothing for what the first compiled beside a long run."""
+def test_what_the_cache_has_is_used_unasked(own_cache, monkeypatch):
+    """The second process pays nothing for what the first compiled beside a long run; a short one does not even look."""
     run = circuit(components=PARTS, nets=NETS, fluid=OIL)
-    assert "interpreted" in run.simulate(1e-3, solver="rodas").trajectory.solver
     compiler.build(promotion.Promotion(run.system(), ["rhs"], None, 0.5).source("rhs"))
-    again = circuit(components=PARTS, nets=NETS, fluid=OIL)
-    assert "compiled functions" in again.simulate(1e-3, solver="rodas").trajectory.solver
-    never = circuit(components=PARTS, nets=NETS, fluid=OIL)
-    assert "interpreted" in never.simulate(1e-3, solver="rodas", compile=False).trajectory.solver
+    monkeypatch.setattr("crescentlab.solvers.compiled.LOOK", 0.0)
+
+    def ran(compile):
+        made = circuit(components=PARTS, nets=NETS, fluid=OIL)
+        return made.simulate(1.0, solver="rodas", compile=compile, max_step=1e-4).trajectory.solver
+
+    assert "interpreted" in ran(None)
+    monkeypatch.setattr(promotion, "PATIENCE", 0.0)
+    assert "compiled functions" in ran(None)
+    assert "interpreted" in ran(False)
 
 
 def test_a_long_run_is_compiled_beside_itself(own_cache, monkeypatch):

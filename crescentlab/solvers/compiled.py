@@ -174,7 +174,7 @@ class _CompiledRun:
             r.give(**{name: _room(r.n_watched)})
         r.give(want=_room(r.n_bits), seen=np.zeros(native.LIMITS["MAX_SETTLING"] * r.n_bits + 1, np.uint8))
         if self.options.solver == "rodas" and n:
-            found = elimination(self.diagnosis.functions.pattern)
+            found = self.system.once("elimination", lambda: elimination(self.diagnosis.functions.pattern))
             r.give(
                 row=_whole(found.row), column=_whole(found.column), diagonal=_whole(found.diagonal),
                 place=_whole(found.place), order=_whole(found.order), lu=_room(found.column.size),

@@ -16,7 +16,7 @@ def clock_pace(system: System, values: Values, start: float, stop: float) -> tup
     """Times, and how far values on time alone have swung until then, in shares of their range; None without any."""
     if not system.clock.numel():
         return None
-    clock = ca.Function("clock", system.arguments, [system.clock])
+    clock = system.once("clock", lambda: ca.Function("clock", system.arguments, [system.clock]))
     times = np.linspace(start, stop, CLOCK_POINTS)
     with np.errstate(all="ignore"):
         swing = np.array(clock(times.reshape(1, -1), values.x0, values.h0, np.zeros(system.b.numel()), values.p))

@@ -37,6 +37,8 @@ class Promotion:
         self.job: compiler.Job | None = None
         self.sources: dict[str, compiler.Source] = {}
         """What is not compiled yet, and might be."""
+        self.settled = False
+        """Whether everything is compiled, or never will be in this run."""
 
     def take(self, name: str) -> Prepared:
         """The function of this name in the form it has now."""
@@ -49,27 +51,26 @@ class Promotion:
         return self.wanted is not False and any((name, self.form) in self.system.built for name in self.names)
 
     def before(self) -> str | None:
-        """Compile what is wanted, or take what the cache has; a notice if that is not possible."""
-        missing = [name for name in self.names if (name, self.form) not in self.system.built]
-        if self.wanted is False or not missing:
+        """Compile what is asked for; a notice if that is not possible."""
+        if not self.wanted:
             return None
         try:
-            compiler.require()
-            size = max(getattr(self.system, name).function.n_instructions() for name in missing)
-            if size > LARGEST:
-                raise CompilerError(f"one has {size} instructions, more than the {LARGEST} that a compiler takes well")
-            self.sources = {name: self.source(name) for name in missing}
-            if self.wanted:
-                with ThreadPoolExecutor(max_workers=os.cpu_count()) as pool:
-                    libraries = pool.map(compiler.build, self.sources.values())
-                    self.adopt(dict(zip(tuple(self.sources), libraries, strict=True)))
-            else:
-                known = {name: compiler.place(source) for name, source in self.sources.items()}
-                self.adopt({name: path for name, path in known.items() if path.is_file()})
+            self.gather()
+            with ThreadPoolExecutor(max_workers=os.cpu_count()) as pool:
+                libraries = pool.map(compiler.build, self.sources.values())
+                self.adopt(dict(zip(tuple(self.sources), libraries, strict=True)))
         except CompilerError as error:
-            self.sources = {}
-            return f"functions are interpreted: {error}" if self.wanted else None
+            return f"functions are interpreted: {error}"
         return None
+
+    def gather(self) -> None:
+        """The C of what is not compiled yet; raises :class:`CompilerError` if it cannot be."""
+        compiler.require()
+        missing = [name for name in self.names if (name, self.form) not in self.system.built]
+        size = max((getattr(self.system, name).function.n_instructions() for name in missing), default=0)
+        if size > LARGEST:
+            raise CompilerError(f"one has {size} instructions, more than the {LARGEST} that a compiler takes well")
+        self.sources = {name: self.source(name) for name in missing}
 
     def source(self, name: str) -> compiler.Source:
         """C of a function."""
@@ -82,7 +83,7 @@ class Promotion:
         """Call functions out of libraries from now on, in this run and later ones of its kind."""
         for name, path in libraries.items():
             self.system.built[name, self.form] = getattr(self.system, name).from_library(path)
-            self.sources.pop(name)
+            del self.sources[name]
 
     @property
     def seconds(self) -> float:
@@ -92,11 +93,11 @@ class Promotion:
 
     def look(self, elapsed: float, share: float, evaluators: dict[str, list[Evaluator]]) -> bool:
         """See beside a run whether compiling pays or is done; whether functions have just been replaced."""
-        if self.wanted is not None or not self.sources:
+        if self.wanted is not None or self.settled or elapsed < PATIENCE:
             return False
         if self.job is None:
-            if elapsed < PATIENCE:
-                return False
+            if not self.sources:
+                return self.replace(self.from_cache(), evaluators)
             left = elapsed * (1 - share) / share if share > 0 else 0.0
             if self.saving * (left - self.seconds) > self.seconds:
                 self.job = compiler.Job(self.sources)
@@ -104,9 +105,23 @@ class Promotion:
             return False
         if self.job.is_alive():
             return False
-        libraries = dict(self.job.libraries)
+        self.settled = True
+        return self.replace(dict(self.job.libraries), evaluators)
+
+    def from_cache(self) -> dict[str, Path]:
+        """What an earlier run compiled."""
+        try:
+            self.gather()
+            known = {name: compiler.place(source) for name, source in self.sources.items()}
+        except CompilerError:
+            known = {}
+        found = {name: path for name, path in known.items() if path.is_file()}
+        self.settled = len(found) == len(known)
+        return found
+
+    def replace(self, libraries: dict[str, Path], evaluators: dict[str, list[Evaluator]]) -> bool:
+        """Let the evaluators call what libraries have; whether there is any."""
         self.adopt(libraries)
-        self.sources = {}
         for name in libraries:
             for evaluator in evaluators.get(name, []):
                 evaluator.use(self.take(name).function)

@@ -93,6 +93,12 @@ PERIODIC = (ca.OP_SIN, ca.OP_COS, ca.OP_TAN, ca.OP_FMOD)
 
 def waves(system: System) -> list[int]:
     """Relations with a periodic function of the states, such as the teeth of a wheel: cos(z phi) > 0.9."""
+    found: list[int] = system.once("waves", lambda: find_waves(system))
+    return found
+
+
+def find_waves(system: System) -> list[int]:
+    """The same, found by walking through the instructions of the relations."""
     walk = ca.Function("walk", system.arguments, [system.relations])
     depends: dict[int, int] = {}  # by register: 0 on no state, 1 on states, 2 periodically
     found: list[int] = []
