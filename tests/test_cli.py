@@ -290,6 +290,36 @@ def test_every_solver_has_a_name(solver: str, capsys: pytest.CaptureFixture[str]
     assert run(capsys, "simulate", "filling.yaml", "--quiet", "-o", "none", "--solver", solver)[0] == 0
 
 
+@pytest.mark.parametrize(("flag", "said"), [("--compile", "compiled"), ("--no-compile", "interpreted")])
+def test_the_summary_says_which_loop_and_which_functions_ran(
+    flag: str, said: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    code, out, _ = run(capsys, "simulate", "filling.yaml", "-o", "none", "--solver", "rodas", flag)
+    assert code == 0
+    assert f"rodas (compiled loop, {said} functions): " in out
+
+
+@pytest.mark.parametrize(("text", "said"), [("true", "compiled"), ("false", "interpreted")])
+def test_the_circuit_file_may_ask_for_compiled_equations(
+    text: str, said: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    file = Path("compiled.yaml")
+    file.write_text(Path("filling.yaml").read_text().replace("simulation: {", f"simulation: {{compile: {text}, ", 1))
+    code, out, _ = run(capsys, "simulate", str(file), "-o", "none", "--solver", "dopri")
+    assert code == 0
+    assert f"dopri (compiled loop, {said} functions): " in out
+
+
+def test_compile_is_true_or_false(capsys: pytest.CaptureFixture[str]) -> None:
+    Path("odd.yaml").write_text(
+        Path("filling.yaml").read_text().replace("simulation: {", "simulation: {compile: fast, ")
+    )
+    code, _, err = run(capsys, "simulate", "odd.yaml", "-o", "none")
+    assert code == 2
+    assert "compile" in err
+    assert "true or false" in err
+
+
 # -- simulate: failures --------------------------------------------------------------------------
 
 
