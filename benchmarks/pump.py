@@ -128,7 +128,7 @@ def shares(pump: Pump) -> None:
     solve = micro(lambda: library.solve(structure, pointer)) - idle
     costs["linear algebra"] = s.factorisations * (factorise + 6 * solve)
     begun = timeit.default_timer()
-    run.rows(), run.pieces()
+    run.records.joined("row_x"), run.records.pieces()
     costs["Python: records to arrays"] = 1e6 * (timeit.default_timer() - begun)
     costs["rest: stages, control, roots, records"] = whole - sum(costs.values())
     print(f"\nwhere the time of compiled rodas goes, {whole / n / 1e3:.2f} ms per revolution")
