@@ -390,6 +390,15 @@ def test_auto_hands_a_long_run_to_the_compiled_loop(monkeypatch):
     assert alone(Buzz).simulate(2.0, rtol=1e-8).trajectory.solver == "auto (lsoda)"
 
 
+def test_a_run_ends_before_it_fills_the_memory(monkeypatch):
+    """What was computed is kept, and the message says how large it is and what takes less."""
+    monkeypatch.setattr("crescentlab.solvers.compiled.MOST_BYTES", 1_000_000)
+    trajectory = alone(Buzz).simulate(20.0, solver="dopri", check=False).trajectory
+    assert trajectory.status == "failed"
+    assert "steps fill 0.0 GB; an implicit solver takes fewer (--solver rodas)" in trajectory.error
+    assert 0 < trajectory.steps.t[-1] < 20
+
+
 def test_auto_stays_with_scipy_without_a_compiler(monkeypatch, no_compiler):
     """And says nothing: nobody asked for another."""
     monkeypatch.setattr(loop, "MANY_STEPS", 3000)

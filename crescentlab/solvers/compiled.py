@@ -33,6 +33,8 @@ LOOK = 0.1
 FIRST_BLOCK = 500
 """Steps before Python first looks in; later about as many as take LOOK, and never more than ..."""
 MOST_BLOCK = 100_000
+MOST_BYTES = 2_000_000_000
+"""A run whose records grow beyond this ends, and keeps them, before the machine ends it and nothing is kept."""
 SAVING = 0.6
 """Share of a run that compiled functions save."""
 FIELDS = {
@@ -229,6 +231,11 @@ class _CompiledRun:
                 self.find_root()
             elif code != "PAUSED":
                 self.fail(code)
+            elif self.records.size > MOST_BYTES:
+                raise SimulationError(
+                    f"its {r.steps} steps fill {self.records.size / 1e9:.1f} GB; "
+                    "an implicit solver takes fewer (--solver rodas), or simulate a shorter time"
+                )
             self.report()
 
     def find_root(self) -> None:

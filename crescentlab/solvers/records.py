@@ -35,6 +35,8 @@ class Records:
         run.rows_max, run.logs_max = rows, logs
         run.give(**self.arrays)
         self.blocks: list[dict[str, Array]] = []
+        self.size = 0
+        """Bytes taken so far."""
 
     def drain(self) -> dict[str, Array] | None:
         """Take what was recorded since the last time; the loop goes on with empty records."""
@@ -45,6 +47,7 @@ class Records:
         block = {name: array[: counts[name.partition("_")[0]]].copy() for name, array in self.arrays.items()}
         block["piece_length"] = block["piece_high"] - block["piece_low"]
         self.blocks.append(block)
+        self.size += sum(array.nbytes for array in block.values())
         run.rows = run.pieces = run.worlds = run.logs = 0
         return block
 
