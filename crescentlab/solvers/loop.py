@@ -89,6 +89,8 @@ class _Run:
         self.pace = clock_pace(system, values, options.start, options.stop)
         self.tiny = 0
         self.shown_at = 0.0
+        self.tension: str | None = None
+        """The first warning of a fluid under tension; every later step would only repeat it."""
         self.give_up: Callable[[], bool] | None = None
         self.count_at = FIRST_COUNT
 
@@ -344,7 +346,8 @@ class _Run:
         except SimulationError:
             self.keep_possible(low, high)
             raise
-        if warning and warning not in self.warnings:
+        if warning and not self.tension:
+            self.tension = warning
             self.warnings.append(warning)
 
     def keep_possible(self, low: float, high: float) -> None:
