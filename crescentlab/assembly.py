@@ -250,11 +250,14 @@ class _Assembly:
         extra = getattr(self, "stop_strict", [])
         names += ["stop_when"] * len(extra)
         strict += extra
+        switches = [info.switches for tr in self.plan.traces.values() for info in tr.relations] + [False] * len(extra)
         on_state = _depends(g, self.x) if n else np.zeros(0, bool)
         timed = (_depends(g, self.t) if n else np.zeros(0, bool)) & ~on_state
         curved = np.array(ca.which_depends(g, self.t, 2, True), bool) if n and timed.any() else np.zeros(n, bool)
         held = _depends(g, ca.vertcat(self.h, b)) if n else np.zeros(0, bool)
-        return Bits(tuple(names), np.array(strict, bool), on_state, timed, timed & ~curved, held)
+        return Bits(
+            tuple(names), np.array(strict, bool), on_state, timed, timed & ~curved, held, np.array(switches, bool)
+        )
 
     def remap(self, may_fire: list[bool]) -> tuple[ca.SX, list[ca.SX]]:
         """Flags of fired events, and the states and held values after them; composed in the order written.

@@ -63,6 +63,8 @@ class Bits:
     linear: Array
     """Of those on time, the ones linear in t."""
     held_dependent: Array
+    switches: Array
+    """Chooses a value; the others serve conditions of events alone."""
 
 
 @dataclass

@@ -97,6 +97,8 @@ class RelationInfo:
 
     text: str
     strict: bool
+    switches: bool
+    """Chooses a value (``event_where``); otherwise it serves conditions of events alone."""
 
 
 @dataclass(frozen=True)
@@ -244,6 +246,7 @@ class _Tracing:
         try:
             returned = self.symbolic.equations(**{n: self.known[n] for n in self.cls.asks_for()})
             check_returned(self.cls, returned)
+            self.switching = len(bits.relations)  # those that follow come from conditions
             self.conditions = [
                 self.lowered(e.condition, bits) if isinstance(e, (Event, Failure)) else ca.SX(0)
                 for e in returned.values()
@@ -276,8 +279,8 @@ class _Tracing:
         relations = [Sym.of(r.lhs - r.rhs if r.operator[0] == ">" else r.rhs - r.lhs).sx for r in bits.relations]
         scales = [Sym.of(abs(r.lhs) + abs(r.rhs)).sx for r in bits.relations]
         infos = [
-            RelationInfo(_text(r), "=" not in r.operator)
-            for r in bits.relations
+            RelationInfo(_text(r), "=" not in r.operator, k < self.switching)
+            for k, r in enumerate(bits.relations)
             for _ in range(r.shape[0] if r.shape else 1)
         ]
         events, conditions, periods = self.events(returned, function)

@@ -20,9 +20,9 @@ import crescentlab as cl
 from crescentlab import compiler
 from crescentlab.c_text import wide_sources
 from crescentlab.component import Component
-from crescentlab.domain import state
+from crescentlab.domain import observable, state
 from crescentlab.errors import CompilerError
-from crescentlab.maths import cos, exp, sin
+from crescentlab.maths import cos, event_where, exp, sin
 from crescentlab.solvers import integrate as integration
 from crescentlab.solvers import loop, native, promotion
 from crescentlab.solvers.elimination import elimination
@@ -448,3 +448,21 @@ def test_shipped_circuits_as_radau_has_them(name, solver):
     for pressure in [n for n in exact.names if n.endswith(".p")]:
         scale = max(float(np.max(np.abs(exact[pressure]))), 1e5)
         np.testing.assert_allclose(found[pressure], exact[pressure], rtol=0, atol=1e-4 * scale)
+
+
+class Indicator(Component):
+    """Says when x has passed a level, and nothing listens."""
+
+    x = plain("x", 0.0)
+    passed = observable(Ratio, "1 once x is above 0.3")
+
+    def equations(self, t, x):
+        return {"der_x": cos(t), "passed": event_where(x > 0.3, 1.0, 0.0)}
+
+
+@pytest.mark.parametrize("solver", ORDERS)
+def test_a_switch_that_only_shows_is_located(solver):
+    """x = sin t passes 0.3 at asin 0.3: located like every other root, although neither f nor an event depends on it."""
+    result = alone(Indicator).simulate(1.0, solver=solver, rtol=1e-9)
+    first = int(np.argmax(result["part.passed"] > 0.5))
+    assert result.time[first] == pytest.approx(np.arcsin(0.3), abs=1e-8)

@@ -137,7 +137,8 @@ class _CompiledRun:
         kinds = [native.KINDS[event.kind.upper()] for event in system.events]
         r.give(
             strict=_whole(system.bits.strict), watched=_whole(hybrid.watched),
-            wave=_whole(np.isin(hybrid.watched, waves(system))), time_linear=_whole(hybrid.linear),
+            switches=_whole(system.bits.switches[hybrid.watched]), wave=_whole(np.isin(hybrid.watched, waves(system))),
+            time_linear=_whole(hybrid.linear),
             rising=_whole(hybrid.rising), ticking=_whole(hybrid.ticking), kind=_whole(kinds),
             holds=_whole(np.zeros(r.n_conditions)), period=_real(hybrid.periods), ticked=_whole(np.zeros(r.n_ticks)),
             due=_whole(np.zeros(r.n_ticks)), first_step=_room(r.n_events),

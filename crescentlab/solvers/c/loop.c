@@ -423,8 +423,8 @@ typedef struct Search {
     int tries;
 } Search;
 
-/* Whether relations that turned within the candidate may as well turn at its end: neither one of them nor both fire
- * anything, nor change f by more than may pass unseen. A valve at rest, whose force is rounding, turns at every step. */
+/* Whether relations that serve conditions alone may turn at the candidate's end instead of within: neither one of them
+ * nor both fire anything. A valve at rest, whose force is rounding, turns at every step. */
 static int harmless(Run *r, double h, const int64_t *turned, int64_t count)
 {
     int harm = 0;
@@ -433,14 +433,9 @@ static int harmless(Run *r, double h, const int64_t *turned, int64_t count)
         put(r, r->t + h, r->x_new);
         if (r->n_conditions) call(r, r->condition);
         for (int64_t k = 0; k < r->n_conditions; k++) harm |= r->conditions[k] > 0.5 && !r->holds[k];
-        if (!harm && mask == (1 << count) - 1) memcpy(r->v_in, rhs(r, r->t + h, r->x_new), r->n * sizeof *r->v_in);
         for (int64_t k = 0; k < count; k++) r->b[turned[k]] = mask >> k & 1 ? !r->b[turned[k]] : r->b[turned[k]];
     }
-    if (harm) return 0;
-    rhs(r, r->t + h, r->x_new);
-    for (int64_t i = 0; i < r->n; i++)
-        if (fabs(r->v_in[i] - r->fx[i]) * h > r->restart_share * (r->atol[i] + r->rtol * fabs(r->x_new[i]))) return 0;
-    return 1;
+    return !harm;
 }
 
 /* Where the accepted candidate of length h leaves the run: 0 it stands without an event, h it ends on an event,
@@ -451,7 +446,7 @@ static double locate(Run *r, double h, Search *s)
     put(r, r->t + h, r->x_new);
     memcpy(r->v_in, r->rate_new, r->n * sizeof *r->v_in);
     call(r, r->watch);
-    int64_t behind = 0, turned = 0, who[FEW];
+    int64_t behind = 0, turned = 0, switches = 0, who[FEW];
     for (int64_t j = 0; j < r->n_watched; j++) {
         const double roundoff = ROUNDOFF * r->w_scale[j];
         r->after[j] = r->side[j] * r->w[j];
@@ -462,11 +457,12 @@ static double locate(Run *r, double h, Search *s)
         if (h <= 4 * r->tolerance && r->slope_new[j] > 0) continue; /* rounding at the start: it is heading back */
         if (turned < FEW) who[turned] = r->watched[j];
         turned++;
+        switches += r->switches[j];
         if (r->after[j] < -2 * r->tolerance * fabs(r->slope_new[j]) - roundoff) behind++;
     }
     s->tries++;
     if (turned && (!behind || h - s->low <= r->tolerance || s->tries > MAX_TRIES)) return h;
-    if (behind && s->tries == 1 && turned <= FEW && harmless(r, h, who, turned)) return h;
+    if (behind && s->tries == 1 && !switches && turned <= FEW && harmless(r, h, who, turned)) return h;
     if (!turned && s->tries > MAX_TRIES) return 0;
     if (!turned && s->high && s->high - h <= r->tolerance) return s->high; /* known to end on it */
     double next = 2; /* first turning, in shares of the candidate */
@@ -474,7 +470,8 @@ static double locate(Run *r, double h, Search *s)
         double theta = 2;
         if (r->after[j] < -r->band[j] && !r->wave[j] && r->before[j] > r->band[j] && r->slope[j] < 0 && r->slope_new[j] < 0)
             theta = close_in(r, j, h, 0, 1);
-        else if (r->after[j] < -r->band[j] || ((r->wave[j] || may_dip(r, j, h)) && !harmless(r, h, r->watched + j, 1)))
+        else if (r->after[j] < -r->band[j] ||
+                 ((r->wave[j] || may_dip(r, j, h)) && (r->switches[j] || !harmless(r, h, r->watched + j, 1))))
             theta = first_turn(r, j, h);
         else if (!turned && s->high && r->slope_new[j] < 0)
             theta = 1 - r->after[j] / r->slope_new[j] / h; /* short of the event: as far as its rate says */

@@ -61,6 +61,7 @@ typedef struct Run {
     /* what is known of relations and events */
     int64_t *strict; /* (n_bits) */
     int64_t *watched; /* (n_watched) places among the relations */
+    int64_t *switches; /* (n_watched) 1: chooses a value, 0: serves conditions of events alone */
     int64_t *wave; /* (n_watched) 1: may swing several times within a step */
     int64_t *time_linear; /* (n_linear) places among the relations */
     int64_t *rising; /* (n_conditions) events */
