@@ -462,7 +462,7 @@ class Indicator(Component):
 
 @pytest.mark.parametrize("solver", ORDERS)
 def test_a_switch_that_only_shows_is_located(solver):
-    """x = sin t passes 0.3 at asin 0.3: located like every other root, although neither f nor an event depends on it."""
+    """x = sin t passes 0.3 at asin 0.3: located like any other root, although neither f nor an event needs it."""
     result = alone(Indicator).simulate(1.0, solver=solver, rtol=1e-9)
     first = int(np.argmax(result["part.passed"] > 0.5))
     assert result.time[first] == pytest.approx(np.arcsin(0.3), abs=1e-8)
