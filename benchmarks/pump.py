@@ -60,6 +60,7 @@ class Pump:
     def run(self, solver: str, rtol: float, compile: bool | None) -> tuple[float, np.ndarray, Any]:
         """Milliseconds per revolution, delivery pressure on the grid, trajectory."""
         trajectory = integrate(self.system, self.values, self.options(solver, rtol, compile))
+        assert trajectory.complete, f"{solver} {rtol}: {trajectory.error}"
         result = Result(self.system, self.values, self.design, trajectory)
         return 1e3 * trajectory.statistics.wall_s / self.revolutions, result["delivery.p"], trajectory
 
@@ -153,9 +154,11 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--revolutions", type=int, default=10)
     parser.add_argument("--rounds", type=int, default=3, help="interleaved runs of each solver")
+    parser.add_argument("--first", type=int, default=1, help="number of the first operating point")
     parser.add_argument("--points", type=int, default=len(POINTS), help="so many operating points")
     options = parser.parse_args()
-    pumps = {name: Pump(*settings, options.revolutions) for name, settings in list(POINTS.items())[: options.points]}
+    chosen = list(POINTS.items())[options.first - 1 :][: options.points]
+    pumps = {name: Pump(*settings, options.revolutions) for name, settings in chosen}
     system = next(iter(pumps.values())).system
     print(
         f"states {system.x.numel()}, held {system.h.numel()}, relations {system.b.numel()}; instructions of f "

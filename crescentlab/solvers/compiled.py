@@ -175,7 +175,11 @@ class _CompiledRun:
         r.give(coef=_room((degree + 1) * n), stages=_room(stages * n))
         for name in ("side", "before", "slope", "slope_last", "after", "slope_new", "band"):
             r.give(**{name: _room(r.n_watched)})
-        r.give(want=_room(r.n_bits), seen=np.zeros(native.LIMITS["MAX_SETTLING"] * r.n_bits + 1, np.uint8))
+        r.give(
+            want=_room(r.n_bits),
+            fastest=_room(r.n_bits),
+            seen=np.zeros(native.LIMITS["MAX_SETTLING"] * r.n_bits + 1, np.uint8),
+        )
         if self.options.solver == "rodas" and n:
             found = self.system.once("elimination", lambda: elimination(self.diagnosis.functions.pattern))
             r.give(

@@ -103,11 +103,16 @@ class Hybrid:
         """Truth of each relation: above its boundary, or on it unless strict."""
         return np.asarray((g > 0) | ((g == 0) & ~self.bits_info.strict))
 
-    def sides(self, t: float, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Where each relation belongs (its truth; within its band, the side it is heading for), and its rate."""
+    def sides(self, t: float, x: np.ndarray, fastest: np.ndarray | None = None) -> tuple[np.ndarray, np.ndarray]:
+        """Where each relation belongs (its truth; within its band, the side it is heading for), and its rate.
+
+        ``fastest`` collects the largest rates met while settling, which set the band: a rate that depends on the bit
+        itself would else put it inside its band with one value and outside with the other.
+        """
         g, rate, scale = self.relation(t, x)
         roundoff = 16 * EPS * scale
-        inside = np.abs(g) <= 2 * self.time_tolerance * np.abs(rate) + roundoff
+        met = np.abs(rate) if fastest is None else np.maximum(fastest, np.abs(rate), out=fastest)
+        inside = np.abs(g) <= 2 * self.time_tolerance * met + roundoff
         moving = np.abs(rate) * self.span > roundoff
         return np.where(inside & moving, rate > 0, self.truth(g)), rate
 
@@ -116,8 +121,9 @@ class Hybrid:
         if not self.n:
             return
         seen: dict[bytes, int] = {}
+        fastest = np.zeros(self.n)
         for _ in range(MAX_SETTLING):
-            new = self.sides(t, x)[0].astype(float)
+            new = self.sides(t, x, fastest)[0].astype(float)
             if np.array_equal(new, self.b):
                 return
             key = new.tobytes()

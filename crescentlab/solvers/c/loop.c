@@ -84,10 +84,10 @@ static void on_path(const Run *r, double h, double theta, double *x, double *rat
 /* -- the discrete half ---------------------------------------------------------------------------------------------- */
 
 /* Side a relation belongs to: its truth; within its tolerance the side it is heading for. */
-static int side_of(const Run *r, double g, double rate, double scale, int64_t strict)
+static int side_of(const Run *r, double g, double rate, double fastest, double scale, int64_t strict)
 {
     const double roundoff = ROUNDOFF * scale;
-    if (fabs(g) <= 2 * r->tolerance * fabs(rate) + roundoff && fabs(rate) * (r->stop - r->start) > roundoff)
+    if (fabs(g) <= 2 * r->tolerance * fastest + roundoff && fabs(rate) * (r->stop - r->start) > roundoff)
         return rate > 0;
     return g > 0 || (g == 0 && !strict);
 }
@@ -112,13 +112,16 @@ static void now_switched(Run *r)
     if (r->curved_held) r->rescan = 1;
 }
 
+/* Bring every bit to rest. A relation's tolerance is that of its fastest rate met on the way: a rate that depends on the
+ * bit itself would else put it inside its tolerance with one value and outside with the other. */
 static int settle(Run *r, int onward)
 {
     for (int round = 0; round < MAX_SETTLING; round++) {
         int64_t other = -1;
         read_relations(r, onward);
         for (int64_t k = r->n_bits - 1; k >= 0; k--) {
-            r->want[k] = side_of(r, r->g[k], r->g_rate[k], r->g_scale[k], r->strict[k]);
+            r->fastest[k] = fmax(round ? r->fastest[k] : 0, fabs(r->g_rate[k]));
+            r->want[k] = side_of(r, r->g[k], r->g_rate[k], r->fastest[k], r->g_scale[k], r->strict[k]);
             if (r->want[k] != r->b[k]) other = k;
         }
         if (other < 0) return PAUSED;
@@ -452,7 +455,7 @@ static double locate(Run *r, double h, Search *s)
         r->after[j] = r->side[j] * r->w[j];
         r->slope_new[j] = r->side[j] * r->w_rate[j];
         r->band[j] = roundoff;
-        const int truth = side_of(r, r->w[j], r->w_rate[j], r->w_scale[j], r->strict[r->watched[j]]);
+        const int truth = side_of(r, r->w[j], r->w_rate[j], fabs(r->w_rate[j]), r->w_scale[j], r->strict[r->watched[j]]);
         if (truth == (r->side[j] > 0)) continue;
         if (h <= 4 * r->tolerance && r->slope_new[j] > 0) continue; /* rounding at the start: it is heading back */
         if (turned < FEW) who[turned] = r->watched[j];

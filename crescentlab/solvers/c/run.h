@@ -117,6 +117,7 @@ typedef struct Run {
 
     /* scratch of the loop */
     double *want; /* (n_bits) */
+    double *fastest; /* (n_bits) largest rate of each relation while settling */
     double *after; /* (n_watched) */
     double *slope_new; /* (n_watched) */
     double *band; /* (n_watched) roundoff of the distances */
