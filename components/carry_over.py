@@ -67,7 +67,7 @@ class CarryOverChain(Component):
     exists = gives_signal(Ratio, "1 for each volume that exists, else 0", size="volumes")
 
     p = state(Pressure, "pressures of the volumes while they exist", start=0.0, nominal=1e5, size="volumes")
-    closed_at = held(Angle, "phase at which the first volume closed", start=0.0)
+    closed_at = held(Angle, "phase at which the first volume closed", start=0.0, counts=True)
     started = held(Ratio, "1 once closed_at belongs to the phase", start=0.0)
 
     q_tip = observable(Flow, "flow out of delivery over the last tip at the crescent, positive towards suction")

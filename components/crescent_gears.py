@@ -72,7 +72,9 @@ class CrescentGears(Component):
     driver_phase = gives_signal(Angle, "shaft angle since a driver volume closed, plus whole pitches")
     driven_phase = gives_signal(Angle, "shaft angle since a driven volume closed, plus whole pitches")
 
-    mesh_start = held(Angle, "shaft angle at which the running pitch began", start=lambda c: -c.phase_at_zero)
+    mesh_start = held(
+        Angle, "shaft angle at which the running pitch began", start=lambda c: -c.phase_at_zero, counts=True
+    )
     started = held(Ratio, "1 once mesh_start belongs to the shaft's angle", start=0.0)
 
     dVd = observable(Displacement, "delivery volume per shaft angle")

@@ -22,7 +22,7 @@ class SpeedSource(Component):
     start_angle: Angle = Field(default=0.0, description="angle at the start")
 
     shaft = gives_rotation("the driven shaft")
-    phi = state(Angle, "angle of the shaft", start="start_angle", nominal=1.0)
+    phi = state(Angle, "angle of the shaft", start="start_angle", nominal=1.0, counts=True)
     torque = observable(Torque, "torque the source gives to the shaft")
     power = observable(Power, "power the source gives to the shaft")
 
@@ -50,7 +50,7 @@ class SignalSpeedSource(Component):
 
     shaft = gives_rotation("the driven shaft")
     speed = takes_signal(Speed, "speed of the shaft")
-    phi = state(Angle, "angle of the shaft", start="start_angle", nominal=1.0)
+    phi = state(Angle, "angle of the shaft", start="start_angle", nominal=1.0, counts=True)
     torque = observable(Torque, "torque the source gives to the shaft")
     power = observable(Power, "power the source gives to the shaft")
 

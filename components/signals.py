@@ -182,7 +182,7 @@ class Pulse(_Inferring, Component):
     period: Time | None = Field(default=None, gt=0, description="time from pulse to pulse; none: one pulse")
 
     y = gives_signal("output_quantity", "the value")
-    begun = held(Time, "begin of the present pulse", start="at")
+    begun = held(Time, "begin of the present pulse", start="at", counts=True)
 
     def equations(self, t: Expr, begun: Expr) -> Equations:
         value = event_where((t >= begun) & (t < begun + self.width), self.high, self.low)

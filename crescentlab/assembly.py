@@ -161,6 +161,8 @@ class _Assembly:
             nominal=self.nominal(),
             held_names=held_names,
             held_quantities=held_quantities,
+            counting_states=self.counting(State),
+            counting_held=self.counting(Held),
             bits=self.bits(g, b),
             _variables=self.variables,
             _remap=self.remap,
@@ -178,6 +180,14 @@ class _Assembly:
                 )
                 quantities += [component.quantity(declared.quantity)] * (1 if n is None else n)
         return names, quantities
+
+    def counting(self, kind: type[State] | type[Held]) -> Array:
+        found: list[bool] = []
+        for component in self.plan.components.values():
+            for declared in type(component).declared(kind):
+                n = component.size_of(declared.size)
+                found += [declared.counts] * (1 if n is None else n)
+        return np.array(found, dtype=bool)
 
     def nominal(self) -> Array:
         found: list[float] = []

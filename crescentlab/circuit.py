@@ -23,12 +23,15 @@ from crescentlab.graph import build
 from crescentlab.library import Library, installed
 from crescentlab.netlist import SMALLEST_RTOL, Netlist, SimulationSection
 from crescentlab.plotting import check_plots
-from crescentlab.result import Result
+from crescentlab.result import END, Result, read_series
 from crescentlab.solvers.options import Options
+from crescentlab.solvers.snapshot import Snapshot
 from crescentlab.system import System
 from crescentlab.trace import structure_of
 from crescentlab.units import QUANTITIES
 
+Start = Result | Snapshot | str | Path
+"""What a run can go on from: another run, where it stood, or its file."""
 SOLVERS: tuple[str, ...] = get_args(SimulationSection.model_fields["solver"].annotation)
 """Names of ``--solver`` and ``solver:``."""
 MAX_ROWS = 10_000_000
@@ -107,10 +110,12 @@ class Circuit:
     def simulate(
         self, stop: str | float | None = None, parameters: Mapping[str, str | float] | None = None, *,
         solver: str | None = None, rtol: float | None = None, output_step: str | float | None = None,
-        max_step: str | float | None = None, compile: bool | None = None,
+        max_step: str | float | None = None, compile: bool | None = None, start: Start | None = None,
         progress: Callable[[float], None] | None = None, check: bool = True,
     ) -> Result:  # fmt: skip
         """Integrate the circuit; text needs units, floats are SI. ``compile`` as for ``--compile``.
+
+        With ``start``, a result or its file, the run goes on from its end, to the time ``stop``.
 
         Raises :class:`InputError` for wrong input, and, with ``check``, :class:`SimulationError` if the run
         fails, its ``result`` attribute holding what was computed.
@@ -126,10 +131,13 @@ class Circuit:
         )  # fmt: skip
         _check(options)
         values = system.values(design)
+        begin = None if start is None else snapshot_of(start, system)
+        if begin is not None and not options.stop > begin.t:
+            raise InputError(f"stop: the start is at {begin.t:g} s already; write an end time beyond it")
         from crescentlab.solvers.integrate import integrate  # a third of a second of SciPy that `check` does without
 
-        trajectory = integrate(system, values, options, progress)
-        result = Result(system, values, design, trajectory)
+        trajectory = integrate(system, values, options, progress, begin)
+        result = Result(system, values if begin is None else begin.values(values), design, trajectory)
         if check and trajectory.status == "failed":
             failure = SimulationError(trajectory.error)
             failure.result = result  # type: ignore[attr-defined]
@@ -137,6 +145,23 @@ class Circuit:
         if check and trajectory.status == "interrupted":
             raise KeyboardInterrupt(trajectory.error)
         return result
+
+
+def snapshot_of(start: Start, system: System) -> Snapshot:
+    """Where a result, or the run that a file holds, ended; raises :class:`InputError` if it cannot be gone on from."""
+    if isinstance(start, Snapshot):
+        return start
+    if isinstance(start, Result):
+        if start.trajectory.end is None:
+            raise InputError("start: this run failed, so there is no end to go on from")
+        return Snapshot.of_text(start.trajectory.end.as_text(start.system), system, "start")
+    attributes = read_series(Path(start))[3]
+    if END not in attributes:
+        kind = "a .csv file does not say" if Path(start).suffix == ".csv" else "it does not say"
+        raise InputError(
+            f"{start}: {kind} where its run ended; start from a .nc or .parquet file of a run that ended well"
+        )
+    return Snapshot.of_text(attributes[END], system, str(start))
 
 
 def stand_in_fluids(design: Design, library: Library) -> dict[str, Fluid]:

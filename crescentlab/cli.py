@@ -31,7 +31,17 @@ COMMANDS = {
     "graph": "draw the schematic",
     "schema": "JSON schema of circuit files, for editors",
     "results": "what a result holds; series as CSV on stdout",
+    "steady": "find the operating point, where nothing changes any more",
+    "periodic": "find the periodic steady state of a circuit with a known period",
+    "linearize": "A, B, C, D, modes, frequency responses and impedances at an operating point",
+    "spectrum": "amplitude spectrum over whole periods; orders; waterfall of a run-up",
+    "doctor": "what is fast, what is slow, and what limits the step",
+    "sensitivity": "derivatives of outcomes by parameters",
+    "study": "run the points of a study file in parallel",
+    "rerun": "repeat one row of a study exactly",
+    "fit": "fit parameters to measured data",
 }
+"""Commands, each a module of :mod:`crescentlab.commands` that declares its ``arguments`` and offers ``run``."""
 
 
 class _Parser(argparse.ArgumentParser):
@@ -88,15 +98,15 @@ def _failed(arguments: list[str], said: str, code: int, status: str) -> int:
 
 
 def _parsed(arguments: list[str]) -> argparse.Namespace:
-    parser, commands = _parser()
     given = next((a for a in arguments if not a.startswith("-")), None)
-    if given is not None and given not in commands:
-        raise InputError(f"unknown command {given!r}: {nearest(given, commands)}")
+    if given is not None and given not in COMMANDS:
+        raise InputError(f"unknown command {given!r}: {nearest(given, COMMANDS)}")
+    parser, chosen = _parser(given)
     options, extra = parser.parse_known_args(arguments, argparse.Namespace(verbose=False, no_code=False))
     if extra:
-        raise InputError(_unexpected(extra, commands[given] if given else parser, given or ""))
+        raise InputError(_unexpected(extra, chosen or parser, given or ""))
     if options.command is None:
-        raise InputError(f"name a command: {', '.join(commands)}; see crescentlab --help")
+        raise InputError(f"name a command: {', '.join(COMMANDS)}; see crescentlab --help")
     return options
 
 
@@ -108,7 +118,8 @@ def _unexpected(extra: list[str], parser: argparse.ArgumentParser, command: str)
     return f"unknown option {option} of crescentlab {command}: {nearest(option, known)}"
 
 
-def _parser() -> tuple[argparse.ArgumentParser, dict[str, argparse.ArgumentParser]]:
+def _parser(given: str | None) -> tuple[argparse.ArgumentParser, argparse.ArgumentParser | None]:
+    """The whole parser, and that of the given command: the only one whose module is imported and asked."""
     common = _Parser(add_help=False, allow_abbrev=False)
     common.add_argument("-v", "--verbose", action="store_true", default=argparse.SUPPRESS, help="log to stderr")
     common.add_argument(
@@ -121,54 +132,16 @@ def _parser() -> tuple[argparse.ArgumentParser, dict[str, argparse.ArgumentParse
         "crescentlab", description="Hydraulic circuits as one global ODE.", allow_abbrev=False, parents=[common]
     )
     parser.add_argument("--version", action="version", version=f"crescentlab {__version__}")
-    chosen = parser.add_subparsers(dest="command", metavar="COMMAND", title="commands")
-    commands: dict[str, argparse.ArgumentParser] = {}
+    commands = parser.add_subparsers(dest="command", metavar="COMMAND", title="commands")
+    chosen = None
     for name, text in COMMANDS.items():
-        commands[name] = chosen.add_parser(
+        command = commands.add_parser(
             name, help=text, description=f"{text[0].upper()}{text[1:]}.", allow_abbrev=False, parents=[common]
         )
-    for name in ("simulate", "check", "graph"):
-        commands[name].add_argument(
-            "circuit", metavar="CIRCUIT", help="a circuit file, or the name of a shipped circuit"
-        )
-        commands[name].add_argument(
-            "--set", action="append", default=[], metavar="NAME=VALUE", help="replace a value; VALUE as in the file"
-        )
-    for name in ("simulate", "check"):
-        commands[name].add_argument("--json", action="store_true", help="print one JSON object on stdout")
-    _simulate(commands["simulate"])
-    commands["components"].add_argument("type", metavar="TYPE", nargs="?", help="a component or fluid type")
-    commands["circuits"].add_argument("name", metavar="NAME", nargs="?", help="a shipped circuit")
-    commands["circuits"].add_argument("--copy", metavar="DIR", help="copy the circuit, its parts and tables to DIR")
-    commands["graph"].add_argument("-o", "--output", metavar="F.svg", required=True, help="picture: .svg, .png or .pdf")
-    commands["results"].add_argument("file", metavar="FILE", help="a result: .nc, .csv or .parquet")
-    commands["results"].add_argument(
-        "variables", metavar="VAR", nargs="*", help="variables to print as CSV; * and ? are wild"
-    )
-    return parser, commands
-
-
-def _simulate(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("--stop", metavar="T", help="end time, for example '50 ms'")
-    parser.add_argument("--solver", metavar="NAME", help="auto, lsoda, bdf, radau, rk45, dop853, cvode, rodas or dopri")
-    parser.add_argument(
-        "--compile", action=argparse.BooleanOptionalAction, help="compile the equations; by default where it pays"
-    )
-    parser.add_argument("--rtol", metavar="R", type=_number, help="relative tolerance of every state")
-    parser.add_argument("--output-step", metavar="DT", help="uniform output grid, for example '0.1 ms'")
-    parser.add_argument("-o", "--output", metavar="FILE", help=".nc, .csv or .parquet; none writes nothing")
-    parser.add_argument(
-        "--record", action="append", default=[], metavar="GLOB", help="variables to write; only * and ? are wild"
-    )
-    parser.add_argument("--plot", action="store_true", help="write the circuit's plots as PNG files beside the result")
-    parser.add_argument("--quiet", action="store_true", help="no progress and no summary")
-
-
-def _number(text: str) -> float:
-    try:
-        return float(text)
-    except ValueError:
-        raise argparse.ArgumentTypeError(f"{text!r} is not a number; write for example 1e-6") from None
+        if name == given:
+            importlib.import_module(f"crescentlab.commands.{name}").arguments(command)
+            chosen = command
+    return parser, chosen
 
 
 if __name__ == "__main__":

@@ -173,6 +173,7 @@ class State(Declared):
     start: float | str | Callable[[Any], Any] = 0.0
     nominal: float | None = None
     size: Size | None = None
+    counts: bool = False
 
 
 @dataclass(eq=False)
@@ -183,6 +184,7 @@ class Held(Declared):
     description: str
     start: float | str | Callable[[Any], Any] = 0.0
     size: Size | None = None
+    counts: bool = False
 
 
 @dataclass(eq=False)
@@ -201,17 +203,22 @@ def _named(quantity: Any) -> Quantity | str:
 
 def state(
     quantity: Any, description: str, *, start: float | str | Callable[[Any], Any] = 0.0, nominal: float | None = None,
-    size: Size | None = None,
+    size: Size | None = None, counts: bool = False,
 ) -> Any:  # fmt: skip
-    """A continuous state. ``start`` is SI, a field's name or a function; ``nominal`` sets its tolerance."""
-    return State(_named(quantity), description, start, nominal, size)
+    """A continuous state. ``start`` is SI, a field's name or a function; ``nominal`` sets its tolerance.
+
+    A state that ``counts`` goes on for ever, as a turning angle does, and only its differences matter: a steady or
+    periodic run does not wait for it to rest.
+    """
+    return State(_named(quantity), description, start, nominal, size, counts)
 
 
 def held(
-    quantity: Any, description: str, *, start: float | str | Callable[[Any], Any] = 0.0, size: Size | None = None
-) -> Any:
-    """A held value, changed only by ``when`` and ``every``."""
-    return Held(_named(quantity), description, start, size)
+    quantity: Any, description: str, *, start: float | str | Callable[[Any], Any] = 0.0, size: Size | None = None,
+    counts: bool = False,
+) -> Any:  # fmt: skip
+    """A held value, changed only by ``when`` and ``every``; for ``counts`` see :func:`state`."""
+    return Held(_named(quantity), description, start, size, counts)
 
 
 def observable(quantity: Any, description: str, *, size: Size | None = None) -> Any:

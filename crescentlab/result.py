@@ -31,6 +31,8 @@ if TYPE_CHECKING:
     from crescentlab.system import System, Values
 
 SUFFIXES = (".nc", ".csv", ".parquet")
+END = "end_of_run"
+"""Attribute of a file that tells where its run stands, whole: what ``--start`` reads."""
 
 
 class Result:
@@ -130,6 +132,7 @@ class Result:
         return {
             "title": self.title, "source": f"crescentlab {__version__}", "circuit": self.design.netlist.name,
             "solver": t.solver, "status": t.status, "complete": int(t.complete), "error": t.error,
+            **({} if t.end is None else {END: t.end.as_text(self.system)}),
         }  # fmt: skip
 
     def to_dataframe(self, record: Sequence[str] = ()) -> pandas.DataFrame:
@@ -258,6 +261,8 @@ def _write_netcdf(
     import h5py
 
     with h5py.File(path, "w", track_order=True) as file:
+        if END in attributes:  # too long for an attribute of netCDF
+            file.create_dataset(END, data=attributes.pop(END), dtype=h5py.string_dtype())
         file.attrs.update(attributes)
         axis = file.create_dataset("time", data=time)
         axis.make_scale("time")
@@ -315,7 +320,9 @@ def _read_netcdf(path: Path) -> tuple[np.ndarray, dict[str, np.ndarray], dict[st
     import h5py
 
     with h5py.File(path, "r") as file:
-        series = {n: np.array(v) for n, v in file.items()}
-        units = {n: str(v.attrs.get("units", "")) for n, v in file.items()}
         attributes = {k: v.item() if hasattr(v, "item") else v for k, v in file.attrs.items() if k[0] != "_"}
+        if END in file:
+            attributes[END] = file[END][()].decode()
+        series = {n: np.array(v) for n, v in file.items() if n != END}
+        units = {n: str(file[n].attrs.get("units", "")) for n in series}
     return series.pop("time"), series, units, attributes

@@ -101,6 +101,10 @@ class System:
     nominal: Array
     held_names: list[str]
     held_quantities: list[Quantity]
+    counting_states: Array
+    """Shape (n,): the states that go on for ever, of which only differences matter."""
+    counting_held: Array
+    """Shape (k,): such held values."""
     bits: Bits
     _variables: Callable[[], dict[str, Variable]]
     _remap: Callable[[list[bool]], tuple[ca.SX, list[ca.SX]]]

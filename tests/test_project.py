@@ -30,6 +30,8 @@ LAYERS: tuple[tuple[str, ...], ...] = (
     ("balance",),
     ("result", "placement", "plotting", "schematic"),
     ("circuit",),
+    ("analysis",),
+    ("studies",),
     ("__init__",),
     ("cli", "commands", "__main__"),
 )

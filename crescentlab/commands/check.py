@@ -11,6 +11,7 @@ from typing import Any
 
 from crescentlab.causality import Plan
 from crescentlab.circuit import load
+from crescentlab.commands import arguments as shared
 from crescentlab.commands.text import counted, settings, table, wrapped
 from crescentlab.graph import Member, Net
 
@@ -19,6 +20,12 @@ MAX_NETS = 60
 MAX_NAMES = 20
 """With more names than this, they are counted by component type."""
 BLANK = "\N{NO-BREAK SPACE}"
+
+
+def arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare what the command takes."""
+    shared.circuit(parser)
+    shared.json(parser)
 
 
 def run(options: argparse.Namespace) -> int:

@@ -15,6 +15,12 @@ FILES = (".yaml", ".yml", ".csv", ".py")
 """Suffixes of texts in a circuit that name another file."""
 
 
+def arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare what the command takes."""
+    parser.add_argument("name", metavar="NAME", nargs="?", help="a shipped circuit")
+    parser.add_argument("--copy", metavar="DIR", help="copy the circuit, its parts and tables to DIR")
+
+
 def run(options: argparse.Namespace) -> int:
     """Run the command."""
     known = shipped()

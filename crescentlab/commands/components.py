@@ -21,6 +21,11 @@ from crescentlab.library import Library, installed
 from crescentlab.units import DISPLAY, Quantity
 
 
+def arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare what the command takes."""
+    parser.add_argument("type", metavar="TYPE", nargs="?", help="a component or fluid type")
+
+
 def run(options: argparse.Namespace) -> int:
     """Run the command."""
     library = installed()

@@ -7,8 +7,15 @@ from pathlib import Path
 
 from crescentlab import schematic
 from crescentlab.circuit import load
+from crescentlab.commands import arguments as shared
 from crescentlab.commands.text import settings
 from crescentlab.graph import build
+
+
+def arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare what the command takes."""
+    shared.circuit(parser)
+    parser.add_argument("-o", "--output", metavar="F.svg", required=True, help="picture: .svg, .png or .pdf")
 
 
 def run(options: argparse.Namespace) -> int:

@@ -13,6 +13,12 @@ from crescentlab.commands.text import counted, table
 from crescentlab.result import matching, read_series
 
 
+def arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare what the command takes."""
+    parser.add_argument("file", metavar="FILE", help="a result: .nc, .csv or .parquet")
+    parser.add_argument("variables", metavar="VAR", nargs="*", help="variables to print as CSV; * and ? are wild")
+
+
 def run(options: argparse.Namespace) -> int:
     """Run the command."""
     time, series, units, attributes = read_series(Path(options.file))

@@ -19,6 +19,11 @@ SCALAR = ["string", "number", "boolean"]
 """Types an editor's YAML reader may see where the file means text: 4, 1e-6 and off among them."""
 
 
+def arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare what the command takes."""
+    del parser  # nothing
+
+
 def run(options: argparse.Namespace) -> int:
     """Run the command."""
     print(json.dumps(schema(installed()), indent=2, ensure_ascii=False))

@@ -15,6 +15,7 @@ from typing import Any
 from crescentlab import plotting
 from crescentlab.circuit import Circuit, load
 from crescentlab.cli import DONE, FAILED, INTERRUPTED
+from crescentlab.commands import arguments as shared
 from crescentlab.commands.text import counted, settings, table
 from crescentlab.result import Result, check_record, check_target
 from crescentlab.units import QUANTITIES
@@ -26,6 +27,22 @@ MAX_NETS = 12
 """Most net pressures listed in the summary."""
 
 
+def arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare what the command takes."""
+    shared.circuit(parser)
+    parser.add_argument("--stop", metavar="T", help="end time, for example '50 ms'")
+    shared.start(parser)
+    shared.solver(parser)
+    parser.add_argument("--output-step", metavar="DT", help="uniform output grid, for example '0.1 ms'")
+    parser.add_argument("-o", "--output", metavar="FILE", help=".nc, .csv or .parquet; none writes nothing")
+    parser.add_argument(
+        "--record", action="append", default=[], metavar="GLOB", help="variables to write; only * and ? are wild"
+    )
+    parser.add_argument("--plot", action="store_true", help="write the circuit's plots as PNG files beside the result")
+    shared.json(parser)
+    shared.quiet(parser)
+
+
 def run(options: argparse.Namespace) -> int:
     """Run the command."""
     values = settings(options.set)
@@ -35,7 +52,7 @@ def run(options: argparse.Namespace) -> int:
     with _progress(options.quiet) as progress:
         result = circuit.simulate(
             options.stop, values, solver=options.solver, rtol=options.rtol, output_step=options.output_step,
-            compile=options.compile, progress=progress, check=False,
+            compile=options.compile, start=options.start, progress=progress, check=False,
         )  # fmt: skip
     status = result.trajectory.status
     log.info("integrated in %.3f s: %s", result.trajectory.statistics.wall_s, status)

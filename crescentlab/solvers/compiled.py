@@ -25,6 +25,7 @@ from crescentlab.solvers.pace import CLOCK_SWING, clock_pace
 from crescentlab.solvers.promotion import Promotion
 from crescentlab.solvers.records import Records, on_grid
 from crescentlab.solvers.roots import waves
+from crescentlab.solvers.snapshot import Snapshot
 from crescentlab.solvers.trajectory import Statistics, Trajectory
 from crescentlab.system import System, Values
 
@@ -57,13 +58,17 @@ def called(system: System, solver: str) -> list[str]:
 
 
 def integrate(
-    system: System, values: Values, options: Options, progress: Callable[[float], None] | None = None
-) -> Trajectory:
+    system: System, values: Values, options: Options, progress: Callable[[float], None] | None = None,
+    start: Snapshot | None = None,
+) -> Trajectory:  # fmt: skip
     """Run the system; failures and interruptions end up in the trajectory's status, nothing is lost.
 
     Raises :class:`CompilerError` where the loop cannot be built.
     """
-    return _CompiledRun(system, values, options, progress).run()
+    run = _CompiledRun(system, values, options, progress)
+    if start is not None:
+        run.resume(start)
+    return run.run()
 
 
 def possible() -> bool:
@@ -150,13 +155,29 @@ class _CompiledRun:
         r.zeno_span = ZENO_SPAN * self.options.span
         r.last_event = -1
 
+    def resume(self, start: Snapshot) -> None:
+        """Begin where another run ended; its states and held values are the start values already."""
+        r, kept = self.run_, self.run_.kept
+        kept["b"][: r.n_bits] = start.b
+        kept["holds"][: r.n_conditions] = start.holds
+        kept["ticked"][: r.n_ticks] = start.ticked
+        r.origin = start.origin
+        r.resumed = 1
+
+    def end(self) -> Snapshot:
+        """Where the run stands."""
+        r, kept = self.run_, self.run_.kept
+        held = {name: kept[name][:size].copy() for name, size in (("h", r.n_held), ("b", r.n_bits))}
+        holds, ticked = kept["holds"][: r.n_conditions].copy(), kept["ticked"][: r.n_ticks].copy()
+        return Snapshot(r.t, self.x, **held, holds=holds, origin=r.origin, ticked=ticked)
+
     def set_task(self) -> None:
         r, o = self.run_, self.options
         r.method = native.METHODS[o.solver]
         r.start, r.stop, r.rtol, r.step_cap = o.start, o.stop, o.rtol, o.step_cap
         r.angle_step, r.clock_swing, r.restart_share = ANGLE_STEP, CLOCK_SWING, RESTART_SHARE
         r.tolerance = self.hybrid.time_tolerance
-        r.t = o.start
+        r.t = r.origin = o.start
         pace = clock_pace(self.system, self.values, o.start, o.stop)
         if pace is not None:
             r.n_pace = pace[0].size
@@ -217,7 +238,7 @@ class _CompiledRun:
             steps=steps, grid=on_grid(self.options.start, step, r.tolerance, steps, pieces) if step else None,
             happenings=self.records.happenings(names), statistics=statistics, pieces=pieces,
             solver=f"{self.options.solver} (compiled loop, {functions} functions)",
-            status=status, error=error, warnings=self.warnings,
+            status=status, error=error, end=None if status == "failed" else self.end(), warnings=self.warnings,
         )  # fmt: skip
 
     def advance(self) -> str:

@@ -11,12 +11,13 @@ from __future__ import annotations
 import functools
 from collections import deque
 from collections.abc import Callable
-from typing import NoReturn
+from typing import Any, NoReturn
 
 import numpy as np
 
 from crescentlab.errors import SimulationError
 from crescentlab.prepared import Evaluator, Prepared
+from crescentlab.solvers.snapshot import Snapshot
 from crescentlab.system import System, Values
 from crescentlab.units import DISPLAY
 
@@ -40,6 +41,8 @@ class Hybrid:
         self.take = take or functools.partial(getattr, system)
         self.system = system
         self.start, self.end = start, stop
+        self.origin = start
+        """Time from which ticks are counted."""
         self.span = stop - start
         self.bits_info = system.bits
         self.f = Evaluator(self.take("rhs"), values.p)
@@ -51,7 +54,7 @@ class Hybrid:
         self.h = values.h0.copy()
         self.holds = np.zeros(system.conditions.numel(), bool)
         self.p = values.p
-        self.finished = False
+        self.finished = self.resumed = False
         self.rising = [k for k, e in enumerate(system.events) if e.kind != "every"]
         self.ticking = [k for k, e in enumerate(system.events) if e.kind == "every"]
         self.periods = np.array(system.period(values.p)).ravel() if self.ticking else np.zeros(0)
@@ -91,9 +94,20 @@ class Hybrid:
 
     # -- settling --------------------------------------------------------------------------------
 
+    def resume(self, snapshot: Snapshot) -> None:
+        """Begin where another run ended; bits, conditions and clocks as they were there."""
+        self.h, self.b, self.holds = snapshot.h.copy(), snapshot.b.copy(), snapshot.holds.astype(bool)
+        self.origin, self.ticked = snapshot.origin, snapshot.ticked.copy()
+        self.resumed = True
+
+    @property
+    def standing(self) -> dict[str, Any]:
+        """What a :class:`Snapshot` keeps of it."""
+        return {"h": self.h, "b": self.b, "holds": self.holds, "origin": self.origin, "ticked": self.ticked}
+
     def begin(self, t: float, x: np.ndarray) -> None:
         """Bits at the start: truth first, then settling."""
-        if self.n:
+        if self.n and not self.resumed:
             for _ in range(2):
                 g = self.relation(t, x)[0]
                 self.b = np.where(self.truth(g), 1.0, 0.0)
@@ -212,11 +226,11 @@ class Hybrid:
 
     def next_tick(self) -> float:
         """Time of the next tick, or infinity."""
-        return float(np.min(self.start + (self.ticked + 1) * self.periods)) if self.ticking else np.inf
+        return float(np.min(self.origin + (self.ticked + 1) * self.periods)) if self.ticking else np.inf
 
     def due(self, t: float) -> list[int]:
         """Positions of the ticks that fall on ``t``, counted as done."""
-        times = self.start + (self.ticked + 1) * self.periods
+        times = self.origin + (self.ticked + 1) * self.periods
         hit = np.flatnonzero(times <= t + self.time_tolerance)
         self.ticked[hit] += 1
         return [int(k) for k in hit]

@@ -20,6 +20,7 @@ from crescentlab.solvers.pace import CLOCK_SWING, clock_pace
 from crescentlab.solvers.promotion import Promotion
 from crescentlab.solvers.roots import RootFinder
 from crescentlab.solvers.scipy import Stepper
+from crescentlab.solvers.snapshot import Snapshot
 from crescentlab.solvers.steppers import stepper
 from crescentlab.solvers.trajectory import Happening, Paths, Recording, Statistics, Trajectory
 from crescentlab.system import System, Values
@@ -50,7 +51,7 @@ class TooManyStepsError(Exception):
 
 def integrate(
     system: System, values: Values, options: Options, progress: Callable[[float], None] | None = None,
-    give_up: Callable[[], bool] | None = None,
+    start: Snapshot | None = None, give_up: Callable[[], bool] | None = None,
 ) -> Trajectory:  # fmt: skip
     """Run the system; failures and interruptions end up in the trajectory's status, nothing is lost.
 
@@ -58,6 +59,8 @@ def integrate(
     """
     run = _Run(system, values, options, progress)
     run.give_up = give_up
+    if start is not None:
+        run.hybrid.resume(start)
     return run.run()
 
 
@@ -98,12 +101,12 @@ class _Run:
 
     def run(self) -> Trajectory:
         begun = self.begun = time.perf_counter()
-        status, error = "done", ""
+        status, error, end = "done", "", None
         try:
             with np.errstate(all="ignore"):  # what is not finite is told by name, not by a warning
                 self.loop()
-            if self.hybrid.finished:
-                status = "stopped"
+            status = "stopped" if self.hybrid.finished else status
+            end = Snapshot(self.now(), self.steps.x[-1], **self.hybrid.standing)
         except SimulationError as problem:
             status, error = "failed", self.told(str(problem))
         except KeyboardInterrupt:
@@ -120,7 +123,7 @@ class _Run:
         return Trajectory(
             steps=self.steps.done(), grid=self.grid.done() if self.grid else None, happenings=self.happenings,
             statistics=s, solver=self.options.solver + layout, pieces=self.pieces, status=status, error=error,
-            warnings=self.warnings,
+            end=end, warnings=self.warnings,
         )  # fmt: skip
 
     def now(self) -> float:

@@ -8,6 +8,8 @@ from typing import Protocol
 
 import numpy as np
 
+from crescentlab.solvers.snapshot import Snapshot
+
 
 @dataclass
 class Statistics:
@@ -171,6 +173,8 @@ class Trajectory:
     status: str = "done"
     """``done``, ``stopped`` (by stop_when), ``failed`` or ``interrupted``."""
     error: str = ""
+    end: Snapshot | None = None
+    """Where the run stands; None if it failed."""
     warnings: list[str] = field(default_factory=list)
 
     @property

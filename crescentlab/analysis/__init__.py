@@ -1,0 +1,1 @@
+"""Analyses of one circuit: operating points, periodic states, linear models, spectra, sensitivities."""
