@@ -17,7 +17,8 @@ from crescentlab.assembly import assemble
 from crescentlab.causality import Plan, plan
 from crescentlab.component import field_quantity
 from crescentlab.elaborate import Design, elaborate
-from crescentlab.errors import InputError, SimulationError, UnitError, nearest
+from crescentlab.errors import ExpressionError, InputError, SimulationError, UnitError, nearest
+from crescentlab.expressions import Value, evaluate, is_expression, number_of
 from crescentlab.fluid import Fluid
 from crescentlab.graph import build
 from crescentlab.library import Library, installed
@@ -106,6 +107,37 @@ class Circuit:
             check_plots(self.netlist, self._systems[key])
             self.assembly_s = time.perf_counter() - begun
         return self._systems[key]
+
+    def period(self, parameters: Mapping[str, str] | None = None, given: str | float | None = None) -> float:
+        """Time [s] after which the circuit repeats itself: ``given``, or ``simulation: {period: ...}``.
+
+        Raises :class:`InputError` if neither says it.
+        """
+        if given is not None:
+            return float(_time(given, "period", None))
+        text, place = self.netlist.sections.simulation.period, self.netlist.place("simulation", "period")
+        if text is None:
+            raise InputError(
+                f"{self.netlist.name}: after what time it repeats itself is not known; write --period '30 ms', "
+                "or in the circuit simulation: {period: 30 ms}"
+            )
+        if not is_expression(text):
+            try:
+                return float(_time(text, "period", None))
+            except InputError as error:
+                raise error.at(place) from None
+        known = self.design(parameters).parameters[""]
+
+        def find(name: str) -> Value:
+            if name not in known:
+                raise ExpressionError(f"no parameter {name!r}: {nearest(name, known)}")
+            return known[name]
+
+        try:
+            seconds = number_of(evaluate(text, find), QUANTITIES["time"])
+            return float(_time(seconds, "period", None))
+        except InputError as error:
+            raise InputError(f"period: {error.message.removeprefix('period: ')}", place) from None
 
     def simulate(
         self, stop: str | float | None = None, parameters: Mapping[str, str | float] | None = None, *,

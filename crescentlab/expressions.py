@@ -10,7 +10,7 @@ import ast
 import math
 import operator
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from fractions import Fraction
 from functools import cache
@@ -43,6 +43,8 @@ class Value:
 
 
 Lookup = Callable[[str], Value]
+Function = Callable[[list[Value]], Value]
+"""Takes the arguments' values; raises :class:`ExpressionError` for the wrong ones."""
 
 
 def is_expression(text: str) -> bool:
@@ -50,8 +52,10 @@ def is_expression(text: str) -> bool:
     return text.startswith("=")
 
 
-def evaluate(text: str, lookup: Lookup) -> Value:
+def evaluate(text: str, lookup: Lookup, functions: Mapping[str, Function] | None = None) -> Value:
     """Value of ``text`` (a leading ``=`` is allowed); names are found by ``lookup(name)``.
+
+    ``functions`` are known besides those of every expression, and before them.
 
     Raises :class:`ExpressionError` for anything but arithmetic, for clashing dimensions, a division
     by zero, or a result that is not finite.
@@ -68,7 +72,7 @@ def evaluate(text: str, lookup: Lookup) -> Value:
         return lookup(name)
 
     try:
-        result = _Walker(body, find).visit(tree)
+        result = _Walker(body, find, functions or {}).visit(tree)
     except ZeroDivisionError:
         raise ExpressionError(f"{shown} divides by zero") from None
     except (OverflowError, FloatingPointError):
@@ -173,8 +177,8 @@ _COMPARE: dict[type[ast.cmpop], Callable[[Any, Any], Any]] = {
 class _Walker:
     """Evaluates the allowed nodes and refuses all others."""
 
-    def __init__(self, body: str, find: Lookup) -> None:
-        self.body, self.find = body, find
+    def __init__(self, body: str, find: Lookup, functions: Mapping[str, Function]) -> None:
+        self.body, self.find, self.functions = body, find, functions
         self.depth = 0
 
     def fail(self, message: str) -> ExpressionError:
@@ -257,8 +261,11 @@ class _Walker:
         return value.value
 
     def call(self, name: str, arguments: list[ast.expr]) -> Value:
+        if name in self.functions:
+            return self.functions[name]([self.number(a) for a in arguments])
         if name not in FUNCTIONS:
-            raise self.fail(f"unknown function {name!r}: {nearest(name, FUNCTIONS)}")
+            known = [*self.functions, *FUNCTIONS]
+            raise self.fail(f"unknown function {name!r}: {nearest(name, known)}")
         if name == "where" and len(arguments) == 3:
             a, b = self.alike(self.number(arguments[1]), self.number(arguments[2]), "choose between")
             return Value(_float(maths.where(self.condition(arguments[0]), a.value, b.value)), a.quantity)

@@ -81,6 +81,9 @@ class SimulationSection(_Section):
     output_step: Time | None = Field(default=None, gt=0, description="uniform output grid; default the accepted steps")
     compile: bool | None = Field(default=None, description="compile the equations; default where it pays")
     stop_when: str | None = Field(default=None, description="a condition that ends the run: line.p > 9 bar")
+    period: str | None = Field(
+        default=None, description="time after which the circuit repeats itself, an expression too: '= 2 * pi / speed'"
+    )
 
 
 class PlotSection(_Section):

@@ -193,7 +193,7 @@ class _CompiledRun:
         x = _room(n)
         x[:n] = self.values.x0
         r.give(x=x, rate=_room(n), x_new=_room(n), rate_new=_room(n), work=_room(n), lu_work=_room(n), inverse=_room(n))
-        r.give(coef=_room((degree + 1) * n), stages=_room(stages * n))
+        r.give(coef=_room((degree + 1) * n), stages=_room(stages * n), limited=_whole(np.zeros(n)))
         for name in ("side", "before", "slope", "slope_last", "after", "slope_new", "band"):
             r.give(**{name: _room(r.n_watched)})
         r.give(
@@ -228,6 +228,7 @@ class _CompiledRun:
         statistics = Statistics(
             steps=r.steps, evaluations=r.evaluations, jacobians=r.jacobians, events=r.events, ticks=r.ticks,
             restarts=r.restarts, rejected=r.rejected, factorisations=r.factorisations, wall_s=wall,
+            limited=r.kept["limited"][: r.n].copy(),
         )  # fmt: skip
         values, names = self.values, [event.name for event in self.system.events]
         at_start = (self.options.start, values.x0, values.h0, np.zeros(r.n_bits))

@@ -24,6 +24,8 @@ class Statistics:
     rejected: int = 0
     factorisations: int = 0
     wall_s: float = 0.0
+    limited: np.ndarray | None = None
+    """Per state, the tried steps in which its scaled error was the largest, shape (n,); the compiled loop's alone."""
 
 
 @dataclass(frozen=True)
@@ -100,6 +102,9 @@ class Pieces(Protocol):
     def b(self) -> Sequence[np.ndarray] | np.ndarray:
         """Bits in each piece, shape (pieces, r)."""
 
+    def at(self, pieces: np.ndarray, times: np.ndarray) -> np.ndarray:
+        """States at one time in each of the given pieces, shape (times, n)."""
+
     def at_nodes(self) -> np.ndarray:
         """States at the Gauss nodes of every piece, shape (pieces, 3, n)."""
 
@@ -123,6 +128,12 @@ class Paths:
         self.path.append(path)
         self.h.append(h)
         self.b.append(b)
+
+    def at(self, pieces: np.ndarray, times: np.ndarray) -> np.ndarray:
+        """States at one time in each of the given pieces, shape (times, n)."""
+        cuts = np.flatnonzero(np.diff(pieces)) + 1  # times of one piece at once
+        groups = zip(np.split(pieces, cuts), np.split(times, cuts), strict=True)
+        return np.concatenate([self.path[int(group[0])](t) for group, t in groups])
 
     def at_nodes(self) -> np.ndarray:
         """States at the Gauss nodes of every piece, shape (pieces, 3, n)."""

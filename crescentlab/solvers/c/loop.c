@@ -57,12 +57,15 @@ void combine(int64_t n, double *to, const double *from, double factor, const dou
 
 double error_norm(const Run *r, const double *error)
 {
-    double sum = 0;
+    double sum = 0, most = 0;
+    int64_t worst = -1;
     for (int64_t i = 0; i < r->n; i++) {
         const double old = fabs(r->x[i]), new = fabs(r->x_new[i]);
-        const double share = error[i] / (r->atol[i] + r->rtol * (old > new ? old : new));
-        sum += share * share;
+        const double share = error[i] / (r->atol[i] + r->rtol * (old > new ? old : new)), square = share * share;
+        sum += square;
+        if (square > most) most = square, worst = i;
     }
+    if (worst >= 0) r->limited[worst]++;
     return sqrt(sum / r->n);
 }
 

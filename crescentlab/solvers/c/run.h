@@ -174,6 +174,7 @@ typedef struct Run {
     int64_t events;
     int64_t ticks;
     int64_t restarts;
+    int64_t *limited; /* (n) attempts in which the state's scaled error was the largest */
 } Run;
 
 enum { WHEN, EVERY, FAIL, STOP }; /* kinds of events */
