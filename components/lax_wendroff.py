@@ -13,6 +13,7 @@ from crescentlab.maths import Expr, every, fabs, fail_when, maximum, pi, stack, 
 from crescentlab.units import Flow, Length, Pressure, Ratio, Time, Volume
 
 from .flow_laws import pipe_friction_drop
+from .two_ports import line_series, line_shunt, two_port_of
 from .wave_laws import (
     Between,
     Wave,
@@ -59,6 +60,7 @@ class LaxWendroffLine(Component):
     """
 
     family: ClassVar[bool] = True
+    sampling: ClassVar[str] = "courant_number"
 
     diameter: Length = structural(gt=0, description="inner diameter")
     length: Length = structural(gt=0, description="length")
@@ -107,6 +109,15 @@ class LaxWendroffLine(Component):
     def cell(self) -> float:
         """Distance of neighbouring nodes [m]."""
         return self.length / self.cells
+
+    def two_port(self, omega: Any, p_mean: float, q_mean: float, fluid: Fluid) -> Any:
+        """Flows into the line per end pressures [m^3/(s Pa)] at omega [rad/s], shape (m, 2, 2): the exact waves.
+
+        The entry loss is linearised, 2 k |q|; symbols and Source: :mod:`.two_ports`.
+        """
+        series = line_series(omega, self.diameter, self.roughness, fluid, p_mean, q_mean)
+        shunt = line_shunt(omega, self.diameter, fluid, p_mean)
+        return two_port_of(series, shunt, self.length, 2 * float(self.entry_loss(fluid)) * abs(q_mean))
 
     def entry_loss(self, fluid: Fluid) -> Any:
         """k of the entry loss k q|q| [Pa s^2/m^6]."""

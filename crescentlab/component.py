@@ -63,6 +63,9 @@ class Component(BaseModel):
 
     family: ClassVar[bool] = False
     """Whether this class only names a family of causal forms (its subclasses)."""
+    sampling: ClassVar[str] = ""
+    """The parameter, if any, that the period of its tick is in proportion to: one that may be made a little smaller, so
+    that a whole number of ticks fills a period."""
 
     @classmethod
     def __pydantic_init_subclass__(cls, **kwargs: Any) -> None:

@@ -49,7 +49,7 @@ def run(options: argparse.Namespace) -> int:
     circuit = load(options.circuit, no_code=options.no_code)
     target = _target(options.output, circuit)
     _check_before(circuit, values, options)
-    with _progress(options.quiet) as progress:
+    with progress_bar(options.quiet) as progress:
         result = circuit.simulate(
             options.stop, values, solver=options.solver, rtol=options.rtol, output_step=options.output_step,
             compile=options.compile, start=options.start, progress=progress, check=False,
@@ -63,7 +63,7 @@ def run(options: argparse.Namespace) -> int:
         plotting.write_plots(result, (target or Path(circuit.netlist.name)).with_suffix("")) if options.plot else []
     )
     if options.json:
-        print(json.dumps(_finite(report(result, target)), indent=2))
+        print(json.dumps(finite(report(result, target)), indent=2))
     elif not options.quiet:
         print(summary(result, target, options.record, pictures))
     if EXIT_CODES[status] != DONE:
@@ -90,7 +90,7 @@ def _check_before(circuit: Circuit, values: dict[str, str], options: argparse.Na
 
 
 @contextmanager
-def _progress(quiet: bool) -> Iterator[Callable[[float], None] | None]:
+def progress_bar(quiet: bool) -> Iterator[Callable[[float], None] | None]:
     """A bar on stderr if that is a terminal, otherwise nothing."""
     if quiet or not sys.stderr.isatty():
         yield None
@@ -124,20 +124,20 @@ def report(result: Result, target: Path | None) -> dict[str, Any]:
     }  # fmt: skip
 
 
-def _finite(value: Any) -> Any:
+def finite(value: Any) -> Any:
     """JSON knows no NaN: such numbers become null."""
     if isinstance(value, dict):
-        return {key: _finite(each) for key, each in value.items()}
+        return {key: finite(each) for key, each in value.items()}
     return None if isinstance(value, float) and not math.isfinite(value) else value
 
 
 def summary(result: Result, target: Path | None, record: list[str], pictures: list[Path]) -> str:
     """The run in a few lines, quantities in display units."""
     parts = [result.title, table(_facts(result), indent="  ")]
-    if figures := _figures(result):
+    if rows := figures(result):
         more = len(result.net_pressures()) - MAX_NETS
         said = f"\n  and {counted(more, 'net')} more" if more > 0 else ""
-        parts.append(table(figures, right=(2, 3, 4, 5), indent="  ") + said)
+        parts.append(table(rows, right=(2, 3, 4, 5), indent="  ") + said)
     parts += [f"  warning: {warning}" for warning in result.trajectory.warnings]
     written = [f"  wrote {path}" for path in pictures]
     if target is not None:
@@ -166,7 +166,7 @@ def _facts(result: Result) -> list[tuple[str, str]]:
     return rows
 
 
-def _figures(result: Result) -> list[tuple[str, ...]]:
+def figures(result: Result) -> list[tuple[str, ...]]:
     """Outputs and net pressures: unit, last value, mean, least, largest."""
     names = [o.name for o in result.design.outputs if o.scope == ""] + result.net_pressures()[:MAX_NETS]
     columns = [n for name in names for n in result.elements(name)]

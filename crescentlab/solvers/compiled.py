@@ -146,6 +146,7 @@ class _CompiledRun:
             time_linear=_whole(hybrid.linear),
             rising=_whole(hybrid.rising), ticking=_whole(hybrid.ticking), kind=_whole(kinds),
             holds=_whole(np.zeros(r.n_conditions)), period=_real(hybrid.periods), ticked=_whole(np.zeros(r.n_ticks)),
+            origin=_real(hybrid.origin),
             due=_whole(np.zeros(r.n_ticks)), first_step=_room(r.n_events),
             recent=_room(r.n_events * native.LIMITS["ZENO_COUNT"]), fired=_whole(np.zeros(r.n_events)),
         )  # fmt: skip
@@ -160,16 +161,15 @@ class _CompiledRun:
         r, kept = self.run_, self.run_.kept
         kept["b"][: r.n_bits] = start.b
         kept["holds"][: r.n_conditions] = start.holds
-        kept["ticked"][: r.n_ticks] = start.ticked
-        r.origin = start.origin
+        kept["origin"][: r.n_ticks], kept["ticked"][: r.n_ticks] = start.clocks(self.hybrid.periods, r.tolerance)
         r.resumed = 1
 
     def end(self) -> Snapshot:
         """Where the run stands."""
         r, kept = self.run_, self.run_.kept
         held = {name: kept[name][:size].copy() for name, size in (("h", r.n_held), ("b", r.n_bits))}
-        holds, ticked = kept["holds"][: r.n_conditions].copy(), kept["ticked"][: r.n_ticks].copy()
-        return Snapshot(r.t, self.x, **held, holds=holds, origin=r.origin, ticked=ticked)
+        clocks = {name: kept[name][: r.n_ticks].copy() for name in ("origin", "ticked", "period")}
+        return Snapshot(r.t, self.x, **held, holds=kept["holds"][: r.n_conditions].copy(), **clocks)
 
     def set_task(self) -> None:
         r, o = self.run_, self.options
@@ -177,7 +177,7 @@ class _CompiledRun:
         r.start, r.stop, r.rtol, r.step_cap = o.start, o.stop, o.rtol, o.step_cap
         r.angle_step, r.clock_swing, r.restart_share = ANGLE_STEP, CLOCK_SWING, RESTART_SHARE
         r.tolerance = self.hybrid.time_tolerance
-        r.t = r.origin = o.start
+        r.t = o.start
         pace = clock_pace(self.system, self.values, o.start, o.stop)
         if pace is not None:
             r.n_pace = pace[0].size

@@ -41,8 +41,6 @@ class Hybrid:
         self.take = take or functools.partial(getattr, system)
         self.system = system
         self.start, self.end = start, stop
-        self.origin = start
-        """Time from which ticks are counted."""
         self.span = stop - start
         self.bits_info = system.bits
         self.f = Evaluator(self.take("rhs"), values.p)
@@ -58,6 +56,8 @@ class Hybrid:
         self.rising = [k for k, e in enumerate(system.events) if e.kind != "every"]
         self.ticking = [k for k, e in enumerate(system.events) if e.kind == "every"]
         self.periods = np.array(system.period(values.p)).ravel() if self.ticking else np.zeros(0)
+        self.origin = np.full(len(self.ticking), start)
+        """Time from which the ticks of each clock are counted."""
         self.ticked = np.zeros(len(self.ticking), dtype=int)
         self.remaps: dict[str, Evaluator] = {}
         self.recent: dict[str, deque[float]] = {}
@@ -97,13 +97,14 @@ class Hybrid:
     def resume(self, snapshot: Snapshot) -> None:
         """Begin where another run ended; bits, conditions and clocks as they were there."""
         self.h, self.b, self.holds = snapshot.h.copy(), snapshot.b.copy(), snapshot.holds.astype(bool)
-        self.origin, self.ticked = snapshot.origin, snapshot.ticked.copy()
+        self.origin, self.ticked = snapshot.clocks(self.periods, self.time_tolerance)
         self.resumed = True
 
     @property
     def standing(self) -> dict[str, Any]:
         """What a :class:`Snapshot` keeps of it."""
-        return {"h": self.h, "b": self.b, "holds": self.holds, "origin": self.origin, "ticked": self.ticked}
+        clocks = {"origin": self.origin, "ticked": self.ticked, "period": self.periods}
+        return {"h": self.h, "b": self.b, "holds": self.holds, **clocks}
 
     def begin(self, t: float, x: np.ndarray) -> None:
         """Bits at the start: truth first, then settling."""

@@ -259,7 +259,7 @@ static void keep_piece(Run *r, double low, double high)
 void find_goal(Run *r)
 {
     double goal = r->stop;
-    for (int64_t k = 0; k < r->n_ticks; k++) goal = fmin(goal, r->origin + (r->ticked[k] + 1) * r->period[k]);
+    for (int64_t k = 0; k < r->n_ticks; k++) goal = fmin(goal, r->origin[k] + (r->ticked[k] + 1) * r->period[k]);
     for (int64_t j = 0; j < r->n_linear; j++) {
         const int64_t k = r->time_linear[j];
         const double ahead = -r->g[k] / r->g_rate[k];
@@ -304,7 +304,7 @@ static int stop_here(Run *r, int start, int landed)
     const int64_t events = r->events, ticks = r->ticks;
     const int only_ticks = !start && !landed && !r->n_linear && !r->curved;
     for (int64_t k = 0; k < r->n_ticks; k++)
-        if (r->origin + (r->ticked[k] + 1) * r->period[k] <= r->t + r->tolerance) r->due[k] = 1, r->ticked[k]++;
+        if (r->origin[k] + (r->ticked[k] + 1) * r->period[k] <= r->t + r->tolerance) r->due[k] = 1, r->ticked[k]++;
     if (r->curved && r->curved_next <= r->t + r->tolerance) r->rescan = 1;
     r->jumped = 0;
     r->last_event = -1;

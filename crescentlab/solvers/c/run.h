@@ -69,6 +69,7 @@ typedef struct Run {
     int64_t *kind; /* (n_events) WHEN, EVERY, FAIL, STOP */
     int64_t *holds; /* (n_conditions) whether the condition held before */
     double *period; /* (n_ticks) */
+    double *origin; /* (n_ticks) time from which they are counted */
     int64_t *ticked; /* (n_ticks) */
     int64_t *due; /* (n_ticks) */
     int64_t *angles; /* (n_angles) states */
@@ -79,7 +80,6 @@ typedef struct Run {
     /* the task */
     int64_t method; /* RODAS or DOPRI */
     double start;
-    double origin; /* from which ticks are counted */
     double stop;
     double rtol;
     double *atol; /* (n) */
