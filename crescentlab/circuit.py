@@ -94,11 +94,12 @@ class Circuit:
     def system(self, parameters: Mapping[str, str] | None = None) -> System:
         """The assembled ODE, its start values tried."""
         design = self.design(parameters)
-        system = self._assembled(design)
+        system = self.assembled(design)
         system.values(design)
         return system
 
-    def _assembled(self, design: Design) -> System:
+    def assembled(self, design: Design) -> System:
+        """The system of a design, made once for each structure."""
         key = tuple((n, structure_of(i.component)) for n, i in design.instances.items())
         key += tuple(structure_of(f) for f in design.fluids.values())
         if key not in self._systems:
@@ -153,7 +154,7 @@ class Circuit:
         fails, its ``result`` attribute holding what was computed.
         """
         design = self.design({k: _text(v) for k, v in (parameters or {}).items()})
-        system = self._assembled(design)
+        system = self.assembled(design)
         section = self.netlist.sections.simulation
         options = Options(
             stop=_time(stop, "stop", section.stop), rtol=section.rtol if rtol is None else rtol,

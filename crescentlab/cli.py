@@ -12,7 +12,7 @@ from collections.abc import Sequence
 from typing import NoReturn
 
 from crescentlab import __version__
-from crescentlab.errors import ComponentError, InputError, nearest
+from crescentlab.errors import ComponentError, InputError, SimulationError, nearest
 
 DONE, BUG, WRONG_INPUT, FAILED, INTERRUPTED = 0, 1, 2, 3, 130
 """Exit codes. FAILED is a simulation that could not go on; what it computed is saved."""
@@ -62,6 +62,8 @@ def main(argv: Sequence[str] | None = None) -> int:
         return done.code if isinstance(done.code, int) else DONE if done.code is None else BUG
     except (InputError, ComponentError) as error:
         return _failed(arguments, str(error), WRONG_INPUT, "invalid")
+    except SimulationError as error:
+        return _failed(arguments, str(error), FAILED, "failed")
     except KeyboardInterrupt as stop:
         return _failed(arguments, str(stop) or "interrupted", INTERRUPTED, "interrupted")
     except BrokenPipeError:  # the reader of stdout, such as head, has seen enough

@@ -16,7 +16,6 @@ from crescentlab.cli import DONE, FAILED
 from crescentlab.commands import arguments as shared
 from crescentlab.commands.simulate import figures, finite, progress_bar
 from crescentlab.commands.text import counted, settings, table
-from crescentlab.errors import SimulationError
 from crescentlab.result import check_record, check_target
 from crescentlab.units import QUANTITIES
 
@@ -47,18 +46,12 @@ def run(options: argparse.Namespace) -> int:
     if target is not None:
         check_target(target)
     check_record(circuit.system(values), options.record)
-    try:
-        with progress_bar(options.quiet) as progress:
-            found = periodic(
-                circuit, values, period=options.period, tolerance=options.tolerance, most=options.most,
-                solver=options.solver, rtol=options.rtol, compile=options.compile, start=options.start,
-                accelerate=not options.plain, compare=options.compare, progress=progress,
-            )  # fmt: skip
-    except SimulationError as problem:
-        print(problem, file=sys.stderr)
-        if options.json:
-            print(json.dumps({"status": "failed", "error": str(problem)}, indent=2))
-        return FAILED
+    with progress_bar(options.quiet) as progress:
+        found = periodic(
+            circuit, values, period=options.period, tolerance=options.tolerance, most=options.most,
+            solver=options.solver, rtol=options.rtol, compile=options.compile, start=options.start,
+            accelerate=not options.plain, compare=options.compare, progress=progress,
+        )  # fmt: skip
     if target is not None:
         found.result.write(target, options.record)
     stem = (target or Path(f"{circuit.netlist.name}_periodic")).with_suffix("")
