@@ -349,7 +349,7 @@ def test_an_interrupted_run_is_saved_and_exits_with_130(
 
         yield stop
 
-    monkeypatch.setattr("crescentlab.commands.simulate._progress", interrupting)
+    monkeypatch.setattr("crescentlab.commands.simulate.progress_bar", interrupting)
     code, out, err = run(capsys, "simulate", "filling.yaml", "--json")
     assert code == 130
     assert json.loads(out)["status"] == "interrupted"
