@@ -59,8 +59,8 @@ def described(name: str, cls: type[Component] | type[Fluid]) -> str:
     """A type in full: docstring, ports, parameters, states, held values, observables, where it is defined."""
     parts = [name, inspect.cleandoc(cls.__doc__ or "")]
     if issubclass(cls, Component):
-        parts.append(_section("ports", ("", "role", "domain", "size", ""), [_port(p) for p in cls.ports()]))
-    parts.append(_section("parameters", ("", "quantity or choice", "default", "range", ""), _parameters(cls)))
+        parts.append(_section("ports", ("", "role", "domain", "size", ""), [port_row(p) for p in cls.ports()]))
+    parts.append(_section("parameters", ("", "quantity or choice", "default", "range", ""), parameter_rows(cls)))
     if issubclass(cls, Component):
         for title, kind in (("states", State), ("held values", Held), ("observables", Observable)):
             rows = [(d.name, _quantity(d.quantity), _size(d.size), d.description) for d in _declared(cls, kind)]
@@ -87,7 +87,7 @@ def _declared(cls: type[Component], kind: type[State] | type[Held] | type[Observ
     return list(found.values())
 
 
-def _port(port: Port) -> tuple[str, str, str, str, str]:
+def port_row(port: Port) -> tuple[str, str, str, str, str]:
     carried = f"signal, {_quantity(port.quantity or 'ratio')}" if port.domain is SIGNAL else port.domain.name
     return port.name, port.role, carried, _size(port.size), port.description
 
@@ -111,7 +111,7 @@ def _size(size: Size | None) -> str:
 # -- parameters ----------------------------------------------------------------------------------
 
 
-def _parameters(cls: type[Component] | type[Fluid]) -> list[tuple[str, ...]]:
+def parameter_rows(cls: type[Component] | type[Fluid]) -> list[tuple[str, ...]]:
     own = (
         [n for n in cls.model_fields if n not in Fluid.model_fields]
         if issubclass(cls, Fluid)
