@@ -11,6 +11,7 @@ from crescentlab.maths import Expr, pi
 from crescentlab.units import Flow, Length, Pressure, PressureDifference, Ratio
 
 from .flow_laws import pipe_friction_drop
+from .two_ports import line_series, line_shunt, two_port_of
 
 
 class Pipe(Component):
@@ -39,6 +40,15 @@ class Pipe(Component):
     p = state(Pressure, "mean pressure", start=0.0, nominal=1e5)
     q = state(Flow, "mean flow from a to b", start=0.0, nominal=1e-3 / 60)
     content = stores()
+
+    def two_port(self, omega: Any, p_mean: float, q_mean: float, fluid: Fluid) -> Any:
+        """Flows into the pipe per end pressures [m^3/(s Pa)] at omega [rad/s], shape (m, 2, 2): the travelling waves.
+
+        The losses are linearised and spread over the length; symbols and Source: :mod:`.two_ports`.
+        """
+        spread = self.loss_coefficient / self.length
+        series = line_series(omega, self.diameter, self.roughness, fluid, p_mean, q_mean, spread)
+        return two_port_of(series, line_shunt(omega, self.diameter, fluid, p_mean), self.length)
 
     def _volume(self) -> Any:
         """Volume of the bore [m^3]."""
