@@ -128,6 +128,8 @@ def finite(value: Any) -> Any:
     """JSON knows no NaN: such numbers become null."""
     if isinstance(value, dict):
         return {key: finite(each) for key, each in value.items()}
+    if isinstance(value, list):
+        return [finite(each) for each in value]
     return None if isinstance(value, float) and not math.isfinite(value) else value
 
 
