@@ -31,7 +31,7 @@ LAYERS: tuple[tuple[str, ...], ...] = (
     ("result", "placement", "plotting", "schematic"),
     ("circuit",),
     ("analysis",),
-    ("studies",),
+    ("studies", "report"),
     ("__init__",),
     ("cli", "commands", "__main__"),
 )
