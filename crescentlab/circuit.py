@@ -109,7 +109,7 @@ class Circuit:
             self.assembly_s = time.perf_counter() - begun
         return self._systems[key]
 
-    def period(self, parameters: Mapping[str, str] | None = None, given: str | float | None = None) -> float:
+    def period(self, design: Design, given: str | float | None = None) -> float:
         """Time [s] after which the circuit repeats itself: ``given``, or ``simulation: {period: ...}``.
 
         Raises :class:`InputError` if neither says it.
@@ -127,7 +127,7 @@ class Circuit:
                 return float(_time(text, "period", None))
             except InputError as error:
                 raise error.at(place) from None
-        known = self.design(parameters).parameters[""]
+        known = design.parameters[""]
 
         def find(name: str) -> Value:
             if name not in known:

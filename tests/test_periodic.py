@@ -120,9 +120,9 @@ def test_the_pump_closes_to_what_a_long_transient_gives() -> None:
     found = periodic(circuit, rtol=1e-6, tolerance=1e-5)
     assert found.converged
     assert found.periods < 20
-    long = circuit.simulate(
-        stop="120 ms", solver="rodas", rtol=1e-6, parameters=whole_ticks(circuit, {}, circuit.period())
-    )
+    design = circuit.design()
+    settings = whole_ticks(circuit.assembled(design), design, circuit.period(design))
+    long = circuit.simulate(stop="120 ms", solver="rodas", rtol=1e-6, parameters=settings)
     for name in ("delivery.p", "throttle.q", "tips.q", "axial.q"):
         mean = Outcome("mean", f"mean({name})")
         assert mean.value(Window(found.result)).value == pytest.approx(

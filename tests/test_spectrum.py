@@ -189,7 +189,7 @@ def test_the_pump_has_its_lines_where_equation_32_says() -> None:
     for f in (433.3, 866.7, 1300.0):
         near = np.abs(found.frequency - f) < 4 * bins
         assert abs(found.frequency[near][np.argmax(found.amplitude[near])] - f) <= bins
-    assert pump.period() == pytest.approx(1 / 433.3333, rel=1e-6)
+    assert pump.period(pump.design()) == pytest.approx(1 / 433.3333, rel=1e-6)
 
 
 # -- files ---------------------------------------------------------------------------------------

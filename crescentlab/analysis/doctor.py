@@ -144,7 +144,7 @@ def _period(circuit: Circuit, parameters: Mapping[str, str] | None, given: str |
     """The circuit's period, if it has one."""
     if given is None and circuit.netlist.sections.simulation.period is None:
         return None
-    return circuit.period(parameters, given)
+    return circuit.period(circuit.design(parameters), given)
 
 
 def _instants(result: Result) -> list[RunModes]:

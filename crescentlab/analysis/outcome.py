@@ -7,6 +7,7 @@ owe nothing to an output grid.
 
 from __future__ import annotations
 
+import zlib
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
@@ -28,6 +29,8 @@ SHARES = np.array([0.0, *GAUSS_WEIGHTS, 0.0])
 """Where each piece is sampled, and with what weight: the ends count for extremes only."""
 LEAST_PIECES = 512
 """No piece is longer than this part of the window: lines up to 100 periods in it are integrated to 1e-4."""
+SCALES = (1.0, 1e3, 1e-3, -1.0)
+"""Sizes of made-up series, in nominal values."""
 WHOLE = 1e-3
 """Part of a period by which a window may miss whole periods: it leaks as much, relative to the other lines."""
 
@@ -85,19 +88,23 @@ class Window:
             )
 
 
-class _Instant(Window):
-    """A window of one instant: for finding wrong names and units before any run."""
+class _MadeUp(Window):
+    """Every variable rises from its scale to twice that: no difference and no mean is zero by chance."""
 
-    def __init__(self, system: System, values: Values, design: Design) -> None:
-        self.system, self.design, self.p = system, design, values.p
+    def __init__(self, system: System, values: Values, design: Design, scale: float) -> None:
+        self.system, self.design, self.p, self.scale = system, design, values.p, scale
         self.start, self.stop = 0.0, 1.0
-        self.t, self.weights = np.zeros(2), np.full(2, 0.5)
-        self.x, self.h = np.tile(values.x0, (2, 1)), np.tile(values.h0, (2, 1))
-        self.b = np.zeros((2, system.b.numel()))
-        self._series = {}
+        self.t, self.weights = np.array([0.0, 1.0]), np.full(2, 0.5)
+
+    def __getitem__(self, name: str) -> Array:
+        """Series of a variable: shape (2,), for a vector (2, n)."""
+        variable = self.system.find(name)
+        own = 1.0 + zlib.crc32(name.encode()) % 1000 / 1000
+        series = self.scale * variable.quantity.nominal * own * np.array([1.0, 2.0])
+        return np.tile(series[:, None], (1, len(variable.expression()))) if variable.vector else series
 
     def whole_periods(self, frequency: float) -> None:
-        """Nothing is known of periods yet."""
+        """Nothing is known of periods before a run."""
 
 
 @dataclass(frozen=True)
@@ -122,9 +129,19 @@ class Outcome:
         return Value(float(found.value), found.quantity)
 
     def quantity(self, system: System, values: Values, design: Design) -> Quantity:
-        """What it will be a number of; raises :class:`InputError` for wrong names, units or functions."""
-        with np.errstate(all="ignore"):
-            return self.value(_Instant(system, values, design)).quantity
+        """What it will be a number of; raises :class:`InputError` for wrong names, units or functions.
+
+        Found on made-up series of several sizes: an outcome may be the root of a difference, or a share of one.
+        """
+        failed: InputError | None = None
+        for scale in SCALES:
+            try:
+                with np.errstate(all="ignore"):
+                    return self.value(_MadeUp(system, values, design, scale)).quantity
+            except InputError as error:
+                failed = failed or error
+        assert failed is not None
+        raise failed
 
 
 def _lookup(window: Window) -> Callable[[str], Value]:

@@ -18,6 +18,7 @@ import numpy as np
 
 from crescentlab.analysis.anderson import Anderson
 from crescentlab.circuit import Circuit, Start, snapshot_of
+from crescentlab.elaborate import Design
 from crescentlab.errors import InputError, SimulationError
 from crescentlab.result import Result
 from crescentlab.solvers.integrate import integrate
@@ -95,12 +96,13 @@ def periodic(
     times the integration's. ``compare`` counts the periods of a plain transient as well. Raises :class:`InputError` if
     the period is not known or not a whole number of a sampled part's ticks, :class:`SimulationError` if a run fails.
     """
-    seconds = circuit.period(parameters, period)
+    design = circuit.design(parameters)
+    seconds = circuit.period(design, period)
     section = circuit.netlist.sections.simulation
     rtol = section.rtol if rtol is None else rtol
-    settings = whole_ticks(circuit, dict(parameters or {}), seconds)
-    design = circuit.design(settings)
-    system = circuit.system(settings)
+    system = circuit.assembled(design)
+    if changed := whole_ticks(system, design, seconds):
+        design = circuit.design({**(parameters or {}), **changed})
     values = system.values(design)
     options = Options(
         stop=seconds, rtol=rtol, solver=solver, compile=section.compile if compile is None else compile,
@@ -119,17 +121,16 @@ def periodic(
     return done
 
 
-def whole_ticks(circuit: Circuit, settings: dict[str, str], period: float) -> dict[str, str]:
-    """``settings`` with every tick made a whole part of the period, by the parameter its component names for that.
+def whole_ticks(system: System, design: Design, period: float) -> dict[str, str]:
+    """Settings that make every tick a whole part of the period, by the parameter its component names for that.
 
     A period of 33.6 ticks does not repeat itself; 34 slightly shorter ones do.
     """
-    system, design = circuit.system(settings), circuit.design(settings)
     names = [event.name for event in system.events if event.kind == "every"]
     if not names:
-        return settings
+        return {}
     ticks = np.array(system.period(system.values(design).p)).ravel()
-    changed = dict(settings)
+    changed: dict[str, str] = {}
     for name, tick in zip(names, ticks, strict=True):
         count = period / tick
         if abs(count - round(count)) <= WHOLE * count and round(count):

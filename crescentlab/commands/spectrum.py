@@ -138,7 +138,7 @@ def _of_circuit(options: argparse.Namespace) -> int:
     system = circuit.system(values)
     names = matching(options.variables, column_names(system), "variable")
     shaft = _shaft(options.orders, circuit, values)
-    period = None if options.waterfall else circuit.period(values, _period(options))
+    period = None if options.waterfall else circuit.period(circuit.design(values), _period(options))
     result, warnings = _run(circuit, values, period, options)
     units = {**DISPLAY, **circuit.netlist.sections.display}
     shown = Shown(result.title, Path(circuit.netlist.name), units, tuple(warnings))

@@ -1,0 +1,21 @@
+"""Studies: many runs of one circuit, over grids, samples and corners.
+
+A study file names a circuit, what varies, how each point is run, and what is measured. The points run side by side in
+worker processes, on this machine or on a Dask cluster; every point becomes a row, whatever happens to it.
+
+.. code-block:: text
+
+    study_file     STUDY.yaml -> Study: its sections, checked for shape, with their places
+    targets        what quantity a varied setting has in the circuit
+    distributions  text -> distributions, ranges and tolerances of a setting
+    sampling       what varies -> points
+    planning       Study -> Planned: the circuit tried, every name and unit checked before any run
+    points         one point -> its outcomes; standing: windows without a run behind them
+    worker, pool   processes that run points, killed when they take too long; dask_runner: the same on a cluster
+    provenance     hashes of the circuit and of the library, versions
+    store          rows on disk: a journal, Parquet parts, the manifest
+    conduct        Planned + store -> what is missing, run; the table
+    tables, pictures (on drawing), progress
+
+Fits of parameters to measured data, the modules ``fit*`` and ``identifiability``, share this room.
+"""
