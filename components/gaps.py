@@ -1,14 +1,16 @@
-"""Narrow gaps with laminar flow: flat slots and annuli, of fixed or signalled size. Drag by walls is not here."""
+"""Narrow gaps with laminar flow: flat slots, annuli, face gaps; fixed, signalled, or with a wall that moves."""
 
-from pydantic import Field
+from typing import Self
+
+from pydantic import Field, model_validator
 
 from crescentlab.component import Component, Equations
-from crescentlab.domain import observable, takes_pressure, takes_signal
+from crescentlab.domain import observable, takes_motion, takes_pressure, takes_rotation, takes_signal
 from crescentlab.fluid import Fluid
-from crescentlab.maths import Expr, maximum
-from crescentlab.units import Flow, Length, Ratio
+from crescentlab.maths import Expr, log, maximum, pi, sqrt
+from crescentlab.units import Angle, Flow, Force, Length, Power, Ratio, Torque
 
-from .flow_laws import annular_flow, slot_flow
+from .flow_laws import annular_flow, drag_flow, radial_flow, slot_flow
 
 
 class LaminarGap(Component):
@@ -120,3 +122,116 @@ class AnnularGap(Component):
         one = annular_flow(p_a, p_b, self.diameter, self.clearance, self.eccentricity, self.length, fluid)
         q = self.parallel * one
         return {"q_a": q, "q_b": -q, "q": q}
+
+
+class AxialFaceGap(Component):
+    r"""Gap between parallel faces, through which fluid leaks radially: port plates, side plates, slippers.
+
+    .. math:: q = n \frac{\alpha h^3}{12 \mu \ln(d_2/d_1)} (p_a - p_b)
+
+    d_1 = `inner_diameter` at a, d_2 = `outer_diameter` at b, h = `height` [m]; \alpha = `angle` [rad] of the sector,
+    for a whole disc q = \pi h^3 \Delta p/(6 \mu \ln(r_2/r_1)); n = `parallel` [-] gaps side by side; p [Pa] gauge; \mu
+    [Pa s] at the mean pressure. The pressure between the edges falls with the logarithm of the radius;
+    `lift` [N] is its force on one face, gauge, over the gap alone: F = (\alpha/2) [r_2^2 p_b - r_1^2 p_a +
+    (r_2^2 - r_1^2)(p_a - p_b)/(2 \ln(r_2/r_1))]. Not for tilted faces, turbulent gaps, or the inertia of fast
+    radial flow. Source: Poiseuille flow between parallel discs; H. E. Merritt, Hydraulic Control Systems (1967),
+    section 3-2.
+    """
+
+    inner_diameter: Length = Field(gt=0, description="of the gap, at a")
+    outer_diameter: Length = Field(gt=0, description="of the gap, at b; larger than the inner")
+    height: Length = Field(ge=0, description="clearance; 0 is closed")
+    angle: Angle = Field(default=2 * pi, gt=0, le=2 * pi, description="sector that is open; default: all round")
+    parallel: Ratio = Field(default=1.0, ge=0, description="number of equal gaps side by side")
+
+    a = takes_pressure("inner edge")
+    b = takes_pressure("outer edge")
+    q = observable(Flow, "flow from a to b")
+    lift = observable(Force, "pressure force of one gap that pushes its faces apart")
+
+    @model_validator(mode="after")
+    def _has_a_width(self) -> Self:
+        if self.outer_diameter <= self.inner_diameter:
+            raise ValueError(
+                f"outer_diameter ({self.outer_diameter * 1e3:g} mm) must be larger than "
+                f"inner_diameter ({self.inner_diameter * 1e3:g} mm)"
+            )
+        return self
+
+    def equations(self, p_a: Expr, p_b: Expr, fluid: Fluid) -> Equations:
+        d_1, d_2 = self.inner_diameter, self.outer_diameter
+        q = self.parallel * radial_flow(p_a, p_b, d_1, d_2, self.height, self.angle, fluid)
+        falling = (d_2 * d_2 - d_1 * d_1) * (p_a - p_b) / (2 * log(d_2 / d_1))
+        lift = self.angle / 8 * (d_2 * d_2 * p_b - d_1 * d_1 * p_a + falling)
+        return {"q_a": q, "q_b": -q, "q": q, "lift": lift}
+
+
+class MovingAnnularGap(Component):
+    r"""Annular gap round a piston or rod that slides: leakage, what the wall drags along, and the drag on it.
+
+    .. math:: q = \frac{\pi d c^3 (1 + 1.5\varepsilon^2)}{12 \mu l} \Delta p + \frac{\pi d c}{2} v, \quad
+              F = \frac{\pi d \mu l}{c \sqrt{1 - \varepsilon^2}} v - \frac{\pi d c}{2} \Delta p
+
+    \Delta p = p_a - p_b [Pa]; q [m^3/s] from a to b, which lies towards increasing x; v [m/s] of the rod; F [N] drag
+    on the rod towards decreasing x; d = `diameter`, c = `clearance` (radial), l = `length` [m], constant;
+    \varepsilon = `eccentricity` [-], below 1, where the drag is infinite; \mu [Pa s] at the mean pressure. What is
+    lost, q \Delta p + F v = `loss` [W], is never negative. Not for the pressures on the ends of the piston
+    (`spool_end`), a land whose overlap changes (`leakage_land`), tilt or turbulence.
+    Source: plane Couette-Poiseuille flow integrated round the gap h = c (1 + \varepsilon cos \theta); J. Ivantysyn,
+    M. Ivantysynova, Hydrostatic Pumps and Motors (2001), on piston and cylinder.
+    """
+
+    diameter: Length = Field(gt=0, description="of the piston")
+    clearance: Length = Field(gt=0, description="radial clearance")
+    length: Length = Field(gt=0, description="along the flow")
+    eccentricity: Ratio = Field(default=0.0, ge=0, lt=1, description="offset of the axes over the clearance")
+
+    a = takes_pressure("end towards decreasing x")
+    b = takes_pressure("end towards increasing x")
+    rod = takes_motion("the piston")
+    q = observable(Flow, "flow from a to b")
+    drag = observable(Force, "force on the piston, positive towards decreasing x")
+    loss = observable(Power, "power turned into heat")
+
+    def equations(self, p_a: Expr, p_b: Expr, v_rod: Expr, fluid: Fluid) -> Equations:
+        drop, around = p_a - p_b, pi * self.diameter
+        q = annular_flow(p_a, p_b, self.diameter, self.clearance, self.eccentricity, self.length, fluid)
+        q = q + drag_flow(v_rod, around, self.clearance)
+        narrow = self.clearance * sqrt(1 - self.eccentricity * self.eccentricity)
+        shear = fluid.dynamic_viscosity((p_a + p_b) / 2) * self.length * v_rod / narrow
+        drag = around * (shear - self.clearance / 2 * drop)
+        return {"q_a": q, "q_b": -q, "f_rod": drag, "q": q, "drag": drag, "loss": q * drop + drag * v_rod}
+
+
+class RotatingAnnularGap(Component):
+    r"""Annular gap round a shaft that turns: leakage along the shaft and the viscous torque on it.
+
+    .. math:: q = \frac{\pi d c^3 (1 + 1.5\varepsilon^2)}{12 \mu l} (p_a - p_b), \quad
+              T = \frac{\pi \mu d^3 l}{4 c \sqrt{1 - \varepsilon^2}}\, \omega
+
+    d = `diameter`, c = `clearance` (radial), l = `length` [m]; \varepsilon = `eccentricity` [-], below 1; \omega
+    [rad/s] of the shaft; T [N m] brakes the shaft; p [Pa] gauge; \mu [Pa s] at the mean pressure; `loss` [W] of leakage
+    and torque. Not for the pressure that a loaded bearing builds up itself, nor for Taylor vortices.
+    Source: Petroff's law (1883), integrated round the gap h = c (1 + \varepsilon cos \theta); leakage: Rundo &
+    Corvaglia (2016), Eq. 23.
+    """
+
+    diameter: Length = Field(gt=0, description="of the shaft")
+    clearance: Length = Field(gt=0, description="radial clearance")
+    length: Length = Field(gt=0, description="along the shaft")
+    eccentricity: Ratio = Field(default=0.0, ge=0, lt=1, description="offset of the axes over the clearance")
+
+    a = takes_pressure("one end")
+    b = takes_pressure("other end")
+    shaft = takes_rotation("the shaft")
+    q = observable(Flow, "flow from a to b")
+    torque = observable(Torque, "torque that brakes the shaft, positive against positive speed")
+    loss = observable(Power, "power turned into heat")
+
+    def equations(self, p_a: Expr, p_b: Expr, omega_shaft: Expr, fluid: Fluid) -> Equations:
+        q = annular_flow(p_a, p_b, self.diameter, self.clearance, self.eccentricity, self.length, fluid)
+        narrow = self.clearance * sqrt(1 - self.eccentricity * self.eccentricity)
+        mu = fluid.dynamic_viscosity((p_a + p_b) / 2)
+        torque = pi * mu * self.diameter**3 * self.length / (4 * narrow) * omega_shaft
+        loss = q * (p_a - p_b) + torque * omega_shaft
+        return {"q_a": q, "q_b": -q, "torque_shaft": torque, "q": q, "torque": torque, "loss": loss}

@@ -165,7 +165,7 @@ class _Assembly:
             counting_held=self.counting(Held),
             bits=self.bits(g, b),
             _variables=self.variables,
-            _remap=self.remap,
+            remapping=self.remap,
             _contents=self.contents(),
         )
 

@@ -107,7 +107,8 @@ class System:
     """Shape (k,): such held values."""
     bits: Bits
     _variables: Callable[[], dict[str, Variable]]
-    _remap: Callable[[list[bool]], tuple[ca.SX, list[ca.SX]]]
+    remapping: Callable[[list[bool]], tuple[ca.SX, list[ca.SX]]]
+    """Which events may fire -> symbols (1 where one fires), and the new x and h as expressions of them."""
     _contents: dict[str, tuple[Callable[[], ca.SX], Callable[[], tuple[ca.SX, ca.SX]]]]
     _functions: dict[Any, ca.Function] = field(default_factory=dict)
     _once: dict[str, Any] = field(default_factory=dict)
@@ -181,7 +182,7 @@ class System:
         return self._remapped([event.kind != "every" for event in self.events])
 
     def _remapped(self, may_fire: list[bool]) -> Prepared:
-        fired, outputs = self._remap(may_fire)
+        fired, outputs = self.remapping(may_fire)
         return prepare("remap", [*self.arguments[:-1], fired], self.p, outputs)
 
     @functools.cached_property

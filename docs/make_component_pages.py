@@ -94,7 +94,7 @@ def _joined(math: str) -> str:
 
 def figures(case: Case) -> str:
     """Expected beside computed."""
-    rows = [(n.what, n.shown(n.expected), n.shown(n.computed), f"{case.tolerance:.0e}") for n in case.compute()]
+    rows = [(n.what, n.shown(n.expected), n.shown(n.computed), f"{case.tolerance:.2g}") for n in case.compute()]
     head = f"*{case.title}* Source: {case.source}. Tolerance: {case.because}.\n\n"
     return head + markdown(("checked", "expected", "computed", "tolerance"), rows)
 

@@ -10,8 +10,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from crescentlab.analysis.outcome import Outcome, Window, functions
-from crescentlab.errors import ExpressionError
+from crescentlab.analysis.outcome import Outcome, Window, functions, lookup
 from crescentlab.expressions import Function, Value, evaluate
 from crescentlab.result import Result
 from crescentlab.solvers.trajectory import Pieces
@@ -53,17 +52,9 @@ def extremes(window: Window, outcomes: Sequence[Outcome]) -> list[int]:
 
         return apply
 
-    def lookup(name: str) -> Value:
-        if name in window.system.variables:
-            return Value(window[name], window.system.variables[name].quantity)
-        own = window.design.parameters.get("", {})
-        if name in own:
-            return own[name]
-        raise ExpressionError(f"no variable or parameter {name!r}")  # told before, by the outcome itself
-
     for outcome in outcomes:
         if any(name in outcome.text for name in REDUCING):
-            evaluate(outcome.text, lookup, {**known, **{name: noted(name) for name in REDUCING}})
+            evaluate(outcome.text, lookup(window), {**known, **{name: noted(name) for name in REDUCING}})
     return list(dict.fromkeys(found))
 
 
@@ -89,7 +80,7 @@ def with_nodes(result: Result, window: Window, gaps: list[tuple[float, float]]) 
     more.t, more.pieces, more.weights = np.array(times), np.array(places, dtype=int), np.zeros(len(times))
     more.x = pieces.at(more.pieces, more.t)
     more.h, more.b = np.asarray(pieces.h)[more.pieces], np.asarray(pieces.b)[more.pieces]
-    more._series = {}
+    more.series = {}
     order = np.lexsort((np.append(window.t, more.t), np.append(window.pieces, more.pieces)))
     return joined(window, more, order)
 
@@ -99,7 +90,7 @@ def joined(window: Window, more: Window, order: Array) -> Window:
     new = copy.copy(window)
     for name in ("t", "pieces", "weights", "x", "h", "b"):
         setattr(new, name, np.concatenate([getattr(window, name), getattr(more, name)])[order])
-    new._series = {name: np.concatenate([known, more[name]])[order] for name, known in window._series.items()}
+    new.series = {name: np.concatenate([known, more[name]])[order] for name, known in window.series.items()}
     return new
 
 

@@ -193,7 +193,7 @@ def _acting(wanted: Input, system: System, outputs: Sequence[Output]) -> Input:
     places = [k for k, _ in wanted.direction]
     parts = [system.f, system.periods, *(system.find(o.base).expression()[o.element] for o in outputs)]
     if any(event.kind == "every" for event in system.events):
-        parts += system._remap([event.kind == "every" for event in system.events])[1]
+        parts += system.remapping([event.kind == "every" for event in system.events])[1]
     stands = ca.jacobian_sparsity(ca.vertcat(*parts), system.p[places])
     columns = set(np.array(stands.get_triplet()[1], dtype=int).tolist())
     direction = tuple(pair for k, pair in enumerate(wanted.direction) if k in columns)

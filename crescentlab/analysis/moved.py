@@ -158,7 +158,7 @@ class Moving:
             new.x, new.h, new.p = w.x + amount * dx, w.h + amount * dh, w.p + amount * reach.p
             new.start, new.stop = w.start + amount * ends[0], w.stop + amount * ends[1]
             new.design = shifted(w.design, reach.circuit, amount)
-            new._series = together(new, list(self.window._series))
+            new.series = together(new, list(self.window.series))
             return np.array([float(outcome.value(new).value) for outcome in outcomes])
 
         found = (at(step) - at(-step)) / (2 * step)

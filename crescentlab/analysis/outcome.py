@@ -63,7 +63,8 @@ class Window:
         self.weights = (SHARES * (end - begin)[:, None]).ravel()
         self.x = pieces.at(self.pieces, self.t)
         self.h, self.b = np.asarray(pieces.h)[self.pieces], np.asarray(pieces.b)[self.pieces]
-        self._series: dict[str, Array] = {}
+        self.series: dict[str, Array] = {}
+        """Variables evaluated so far."""
 
     @property
     def length(self) -> float:
@@ -72,11 +73,11 @@ class Window:
 
     def __getitem__(self, name: str) -> Array:
         """Series of a variable: shape (m,), for a vector (m, n)."""
-        if name not in self._series:
+        if name not in self.series:
             vector = self.system.find(name).vector
             values = self.system.function_of([name])(self.t.reshape(1, -1), self.x.T, self.h.T, self.b.T, self.p)
-            self._series[name] = np.array(values).T if vector else np.array(values).ravel()
-        return self._series[name]
+            self.series[name] = np.array(values).T if vector else np.array(values).ravel()
+        return self.series[name]
 
     def whole_periods(self, frequency: float) -> None:
         """Raise :class:`ExpressionError` unless the window holds whole periods of ``frequency`` [Hz]."""
@@ -118,7 +119,7 @@ class Outcome:
     def value(self, window: Window) -> Value:
         """The number, SI, with its quantity; raises :class:`InputError` for text that gives none."""
         try:
-            found = evaluate(self.text, _lookup(window), functions(window))
+            found = evaluate(self.text, lookup(window), functions(window))
         except InputError as error:
             raise InputError(f"{self.name}: {error.message}", self.place) from None
         if isinstance(found.value, (bool, np.bool_, str)):
@@ -144,7 +145,9 @@ class Outcome:
         raise failed
 
 
-def _lookup(window: Window) -> Callable[[str], Value]:
+def lookup(window: Window) -> Callable[[str], Value]:
+    """Finds variables, as series over the window, and the circuit's parameters."""
+
     def find(name: str) -> Value:
         if name in window.system.variables:
             return Value(window[name], window.system.variables[name].quantity)

@@ -133,7 +133,7 @@ def _rates(system: System, groups: tuple[int, ...]) -> tuple[ca.SX, ca.SX]:
 def tick(system: System) -> ca.Function:
     """(t, x, h, b, p, fired) -> states and held values after the ticks that fall due."""
     may_fire = [event.kind == "every" for event in system.events]
-    fired, outputs = system._remap(may_fire)
+    fired, outputs = system.remapping(may_fire)
     return ca.Function("tick", [*system.arguments, fired], [ca.densify(o) for o in outputs])
 
 

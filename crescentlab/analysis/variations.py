@@ -147,7 +147,7 @@ def _relations_along(system: System) -> ca.Function:
 
 def _remap_along(system: System, kind: str) -> ca.Function:
     may_fire = [kind == "all" or (event.kind == "every") == (kind == "ticks") for event in system.events]
-    fired, after = system._remap(may_fire)
+    fired, after = system.remapping(may_fire)
     symbols, directions = _directions(system)
     changes = [ca.densify(ca.jtimes(each, symbols, ca.vertcat(*directions))) for each in after]
     return ca.Function("remap_along", [*system.arguments[:-1], fired, system.p, *directions], changes)

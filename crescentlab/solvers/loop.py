@@ -174,6 +174,7 @@ class _Run:
             self.rate = self.stepper.rate()
             self.check_step(low, high, x_high)
             event = self.roots.first(low, high, x_high, self.rate, self.stepper.interpolant)
+            self.check_pressures(low, high if event is None else event, x_high)
             self.fill(low, high if event is None else event)
             if event is not None:
                 return self.inside(event, high, x_high, goal)
@@ -344,10 +345,14 @@ class _Run:
                 raise SimulationError(f"the step size collapsed to {high - low:.2g} s; {self.diagnosis.blame(high, x)}")
         else:
             self.tiny = 0
+
+    def check_pressures(self, low: float, end: float, x_high: np.ndarray) -> None:
+        """Refuse impossible pressures at the end of a step, or at the event that ends it sooner."""
+        x = x_high if end >= self.stepper.t else np.array(self.stepper.interpolant()(end))
         try:
-            warning = self.limits.check(high, x, self.hybrid.h)
+            warning = self.limits.check(end, x, self.hybrid.h)
         except SimulationError:
-            self.keep_possible(low, high)
+            self.keep_possible(low, end)
             raise
         if warning and not self.tension:
             self.tension = warning

@@ -18,7 +18,7 @@ class Still(Window):
         self.now = self.t = np.full(2, at.t)
         self.weights = np.full(2, 0.5)
         self.x, self.h, self.b = np.tile(at.x, (2, 1)), np.tile(at.h, (2, 1)), np.tile(at.b, (2, 1))
-        self._series = {}
+        self.series = {}
 
     def __getitem__(self, name: str) -> np.ndarray:
         """Series of a variable, at the time at which the point stands."""
