@@ -1,11 +1,11 @@
-"""Ends of a hydraulic circuit: tanks, sources of pressure and flow, and plugs. They store nothing."""
+"""Ends of a hydraulic circuit: tanks, vents, sources of pressure and flow, and plugs. They store nothing."""
 
 from pydantic import Field
 
 from crescentlab.component import Component, Equations
-from crescentlab.domain import gives_pressure, takes_pressure, takes_signal
+from crescentlab.domain import gives_pressure, observable, state, takes_pressure, takes_signal
 from crescentlab.maths import Expr
-from crescentlab.units import Flow, Pressure
+from crescentlab.units import Flow, Pressure, Volume
 
 
 class Tank(Component):
@@ -13,7 +13,7 @@ class Tank(Component):
 
     .. math:: p = p_T
 
-    p_T = `pressure` [Pa] gauge. Not for a level that changes. Source: boundary condition; p_T of Rundo &
+    p_T = `pressure` [Pa] gauge. Not for a level that changes (`reservoir`). Source: boundary condition; p_T of Rundo &
     Corvaglia (2016), list of symbols.
     """
 
@@ -23,6 +23,24 @@ class Tank(Component):
 
     def equations(self) -> Equations:
         return {"p_port": self.pressure}
+
+
+class AtmosphericVent(Component):
+    r"""Opening to the atmosphere: what reaches it leaves the circuit, and is counted.
+
+    .. math:: p = 0, \quad \frac{dV}{dt} = q_{port}
+
+    p [Pa] gauge; q [m^3/s] into the vent; V = `lost` [m^3] volume at 0 bar gauge that has left, less what was drawn in
+    again. The fluid that a circuit draws through it is the circuit's own: not for the air that a real vent would let
+    in. Source: boundary condition.
+    """
+
+    port = gives_pressure("the atmosphere")
+    lost = state(Volume, "volume that has left", start=0.0, nominal=1e-6, counts=True)
+    outflow = observable(Flow, "flow into the atmosphere")
+
+    def equations(self, q_port: Expr) -> Equations:
+        return {"p_port": 0.0, "der_lost": q_port, "outflow": q_port}
 
 
 class PressureSource(Component):

@@ -1,6 +1,6 @@
 """Volumes of compressible fluid: parts that give a pressure and balance the mass that enters them."""
 
-from typing import Annotated
+from typing import Annotated, Any, Literal
 
 from pydantic import Field
 
@@ -8,9 +8,9 @@ from crescentlab import units
 from crescentlab.component import Component, Equations
 from crescentlab.domain import gives_pressure, state, stores, takes_chamber
 from crescentlab.fluid import Fluid
-from crescentlab.maths import Expr
+from crescentlab.maths import Expr, pi
 from crescentlab.tables import Curve, CurveOf
-from crescentlab.units import Area, Pressure, Volume
+from crescentlab.units import Area, Length, Pressure, Ratio, Volume
 
 
 class Capacity(Component):
@@ -97,3 +97,51 @@ class CompliantCapacity(Component):
             "der_p": (swell * q_port - dV_chamber) / (volume / fluid.bulk_modulus(p) + compliance),
             "content": volume / swell,
         }
+
+
+class ElasticCapacity(Component):
+    r"""Volume in a round tube or vessel whose elastic wall gives way under the pressure.
+
+    .. math:: \frac{dp}{dt} = \frac{\rho_0}{\rho} \frac{\sum q}{V/\beta + V_0 c}, \quad V = V_0 (1 + c p), \quad
+              c = \frac{2 (1 + \nu_w) + k B}{E}, \quad B = \frac{d^2}{(d + 2 e)^2 - d^2}
+
+    p [Pa] gauge; V_0 = \pi/4 d^2 l [m^3]; d = `diameter` (inner), l = `length`, e = `wall_thickness` [m]; E =
+    `youngs_modulus` [Pa], \nu_w = `poissons_ratio` [-] of the wall; k = 5 - 4 \nu_w for `ends` closed (a vessel, free
+    to grow longer), 4 with expansion joints, 4 (1 - \nu_w^2) anchored (no axial strain); q [m^3/s] into the volume,
+    mass flow over \rho_0; \rho [kg/m^3]; \beta [Pa]. c is exact for walls of any thickness; for a thin wall it is k
+    d/(4 e E), so that the effective bulk modulus is \beta/(1 + k \beta d/(4 e E)). Stored: V \rho/\rho_0 [m^3]. Not for
+    hoses, whose walls are neither linear nor without loss. Source: G. Lame (1852); S. Timoshenko, Strength of Materials
+    II, thick-walled cylinders; E. B. Wylie, V. L. Streeter, Fluid Transients in Systems (1993), thin
+    walls.
+    """
+
+    diameter: Length = Field(gt=0, description="inner diameter")
+    length: Length = Field(gt=0, description="length")
+    wall_thickness: Length = Field(gt=0, description="thickness of the wall")
+    youngs_modulus: Pressure = Field(default=210e9, gt=0, description="Young's modulus of the wall")
+    poissons_ratio: Ratio = Field(default=0.3, ge=0, le=0.5, description="Poisson's ratio of the wall")
+    ends: Literal["closed", "expansion_joints", "anchored"] = Field(
+        default="closed",
+        description="what the ends of the cylinder do: bear its axial force, slide, or hold it in place",
+    )
+
+    port = gives_pressure("the volume")
+    p = state(Pressure, "pressure", start=0.0, nominal=1e5)
+    content = stores()
+
+    def equations(self, p: Expr, q_port: Expr, fluid: Fluid) -> Equations:
+        volume = pi / 4 * self.diameter * self.diameter * self.length
+        compliance = volume * self._wall()
+        swell = fluid.rho_0 / fluid.density(p)
+        grown = volume + compliance * p
+        return {
+            "p_port": p,
+            "der_p": swell * q_port / (grown / fluid.bulk_modulus(p) + compliance),
+            "content": grown / swell,
+        }
+
+    def _wall(self) -> Any:
+        """c [1/Pa], growth of the volume per pressure."""
+        nu, inner, outer = self.poissons_ratio, self.diameter, self.diameter + 2 * self.wall_thickness
+        axial = {"closed": 5 - 4 * nu, "expansion_joints": 4.0, "anchored": 4 * (1 - nu * nu)}[self.ends]
+        return (2 * (1 + nu) + axial * inner * inner / (outer * outer - inner * inner)) / self.youngs_modulus

@@ -9,8 +9,18 @@ from typing import Self
 from pydantic import Field, model_validator
 
 from crescentlab.fluid import Fluid
-from crescentlab.maths import Expr, exp, sqrt, where
+from crescentlab.maths import Expr, exp
 from crescentlab.units import Density, KinematicViscosity, Pressure, Ratio
+
+from .fluid_laws import Law, absolute_pressure, exponential_liquid, free_air
+
+
+def saturated_too_early(saturation_pressure: float, atmospheric_pressure: float) -> str:
+    """What is wrong with a saturation pressure [Pa] that was meant as a gauge pressure."""
+    return (
+        f"saturation_pressure ({saturation_pressure / 1e5:g} bar) is absolute and must exceed the "
+        f"atmospheric pressure ({atmospheric_pressure / 1e5:g} bar); without free air use simple_oil"
+    )
 
 
 class SimpleOil(Fluid):
@@ -59,8 +69,8 @@ class AeratedOil(Fluid):
     \rho rises with p (relative change (P_min/P)^2); over the last `dissolution_rounding` of the way from P_atm to
     P_sat, x turns into a cubic that meets zero with zero slope. From P_sat on the oil is the pure liquid.
 
-    Not for slow air release, foam or vapour. Source: Rundo & Corvaglia (2016), section 6.3 and Fig. 20, from
-    Henry's law and the polytropic law p v^n = const. for the free air.
+    Not for slow air release, foam or vapour (`cavitating_oil`). Source: Rundo & Corvaglia (2016), section 6.3 and Fig.
+    20, from Henry's law and the polytropic law p v^n = const. for the free air.
     """
 
     liquid_density: Density = Field(alias="density", gt=0, description="density of the air-free liquid at 0 bar gauge")
@@ -75,49 +85,29 @@ class AeratedOil(Fluid):
     @model_validator(mode="after")
     def _saturates_above_atmosphere(self) -> Self:
         if self.saturation_pressure <= self.atmospheric_pressure:
-            raise ValueError(
-                f"saturation_pressure ({self.saturation_pressure / 1e5:g} bar) is absolute and must exceed the "
-                f"atmospheric pressure ({self.atmospheric_pressure / 1e5:g} bar); without free air use simple_oil"
-            )
+            raise ValueError(saturated_too_early(self.saturation_pressure, self.atmospheric_pressure))
         return self
 
     def density(self, p: Expr) -> Expr:
         """rho(p) [kg/m^3]."""
-        volume, _ = self._specific_volume(p)
-        return self.liquid_density / volume
+        rho: Expr = self.liquid_density / self._specific_volume(p)[0]
+        return rho
 
     def bulk_modulus(self, p: Expr) -> Expr:
         """beta(p) = rho dp/drho [Pa]."""
         volume, slope = self._specific_volume(p)
-        return -volume / slope
+        beta: Expr = -volume / slope
+        return beta
 
     def kinematic_viscosity(self, p: Expr) -> Expr:
         """nu(p) [m^2/s]."""
         return self.viscosity + 0.0 * p
 
-    def _specific_volume(self, p: Expr) -> tuple[Expr, Expr]:
+    def _specific_volume(self, p: Expr) -> Law:
         """rho_l/rho [-] and its derivative with respect to p [1/Pa]."""
-        P, dP = self._absolute_pressure(p)
-        x, dx = self._free_share(P)
-        liquid = exp(-p / self.liquid_modulus)
-        gas = (
-            self.air_fraction / (1 - self.air_fraction) * (self.atmospheric_pressure / P) ** (1 / self.polytropic_index)
-        )
-        return liquid + gas * x, -liquid / self.liquid_modulus + gas * (dx - x / (self.polytropic_index * P)) * dP
-
-    def _absolute_pressure(self, p: Expr) -> tuple[Expr, Expr]:
-        """Rounded absolute pressure [Pa], always positive, and its derivative; no cancellation on either side."""
-        bare = p + self.atmospheric_pressure
-        size = where(bare > 0, bare, -bare)
-        root = sqrt(bare * bare + 4 * self.minimum_pressure * self.minimum_pressure)
-        large = (size + root) / 2
-        P = where(bare > 0, large, self.minimum_pressure * self.minimum_pressure / large)
-        return P, P / root
-
-    def _free_share(self, P: Expr) -> tuple[Expr, Expr]:
-        """Free air relative to that at atmospheric pressure [-], and its derivative [1/Pa]."""
-        span, w = self.saturation_pressure - self.atmospheric_pressure, self.dissolution_rounding
-        z = (self.saturation_pressure - P) / span
-        x = where(z > w, z, where(z > 0, z * z * (2 * w - z) / (w * w), 0.0))
-        dx = where(z > w, 1.0, where(z > 0, z * (4 * w - 3 * z) / (w * w), 0.0))
-        return x, -dx / span
+        volume, slope = exponential_liquid(p, self.liquid_modulus)
+        air, air_slope = free_air(
+            absolute_pressure(p, self.atmospheric_pressure, self.minimum_pressure), self.air_fraction,
+            self.atmospheric_pressure, self.saturation_pressure, self.polytropic_index, self.dissolution_rounding,
+        )  # fmt: skip
+        return volume + air, slope + air_slope

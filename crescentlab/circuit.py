@@ -35,6 +35,8 @@ Start = Result | Snapshot | str | Path
 """What a run can go on from: another run, where it stood, or its file."""
 SOLVERS: tuple[str, ...] = get_args(SimulationSection.model_fields["solver"].annotation)
 """Names of ``--solver`` and ``solver:``."""
+DESIGNS = 32
+"""Designs kept: an analysis asks for the same one several times."""
 MAX_ROWS = 10_000_000
 """Most rows of a uniform output grid."""
 
@@ -64,13 +66,14 @@ def load(name: str | Path, *, no_code: bool = False) -> Circuit:
 
 
 class Circuit:
-    """A circuit ready to be checked and simulated."""
+    """A circuit ready to be checked and simulated. Its files are read once: load it again to see them changed."""
 
     def __init__(self, netlist: Netlist, *, library: Library | None = None, no_code: bool = False) -> None:
         self.netlist = netlist
         self._library = library
         self.no_code = no_code
         self._systems: dict[Any, System] = {}
+        self._designs: dict[tuple[tuple[str, str], ...], Design] = {}
         self.assembly_s = 0.0
 
     @property
@@ -81,8 +84,15 @@ class Circuit:
         return self._library
 
     def design(self, parameters: Mapping[str, str] | None = None) -> Design:
-        """The flat circuit with numbers; ``parameters`` as for ``--set``."""
-        return elaborate(self.netlist, self.library, parameters, no_code=self.no_code)
+        """The flat circuit with numbers; ``parameters`` as for ``--set``. The latest few are kept."""
+        key = tuple((parameters or {}).items())
+        found = self._designs.get(key)
+        if found is None:
+            found = elaborate(self.netlist, self.library, parameters, no_code=self.no_code)
+            for old in list(self._designs)[: 1 - DESIGNS]:
+                self._designs.pop(old, None)  # threads may share a circuit
+            self._designs[key] = found
+        return found
 
     def plan(self, parameters: Mapping[str, str] | None = None, *, allow_open: bool = False) -> Plan:
         """Its causality; raises an explained conflict. With ``allow_open`` a part's ports may be left open."""

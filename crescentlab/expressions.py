@@ -13,7 +13,7 @@ import re
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from fractions import Fraction
-from functools import cache
+from functools import cache, lru_cache
 from typing import Any
 
 import casadi as ca
@@ -111,6 +111,7 @@ def _literal_pattern() -> re.Pattern[str]:
     return re.compile(rf"(?<![\w.])(\d+\.?\d*(?:[eE][+-]?\d+)?|\.\d+)\s*({'|'.join(spelled)})(?![\w²³^])")
 
 
+@lru_cache(maxsize=4096)
 def _parse(body: str) -> tuple[ast.expr, dict[str, Value]]:
     if len(body) > MAX_LENGTH:
         raise ExpressionError(f"an expression of {len(body)} characters; at most {MAX_LENGTH} are read")

@@ -245,6 +245,10 @@ flow_conductance = _quantity(
 )  # fmt: skip
 pressure_rate = _quantity("pressure_rate", "Pa/s", (1, -1, -3, 0), _BAR, {"bar/s": _BAR, "Pa/s": 1.0, "bar/ms": 1e8})
 temperature_rate = _quantity("temperature_rate", "K/s", (0, 0, -1, 1), 1.0, {"K/s": 1.0, "K/min": 1 / 60.0})
+pressure_coefficient = _quantity(
+    "pressure_coefficient", "1/Pa", (-1, 1, 2, 0), 1e-9,
+    {"1/GPa": 1e-9, "1/Pa": 1.0, "1/MPa": 1e-6, "1/bar": 1e-5, "mm2/N": 1e-6, "m2/N": 1.0},
+)  # fmt: skip
 flow_rate_of_change = _quantity("flow_rate_of_change", "m^3/s^2", (0, 3, -2, 0), _LPM, {"L/min/s": _LPM, "m3/s2": 1.0})
 
 Ratio = Annotated[float, ratio]
@@ -279,6 +283,8 @@ RotaryDamping = Annotated[float, rotary_damping]
 FlowResistance = Annotated[float, flow_resistance]
 QuadraticResistance = Annotated[float, quadratic_resistance]
 FlowConductance = Annotated[float, flow_conductance]
+PressureCoefficient = Annotated[float, pressure_coefficient]
+"""Relative change per pressure, for example of a viscosity."""
 
 COMMON = "bar, L/min, mm, mm^2, cm^3, rpm, ms, deg, N, Nm, kg, cSt"
 """Units that messages name where the quantity is not known."""

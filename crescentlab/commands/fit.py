@@ -40,7 +40,7 @@ def run(options: argparse.Namespace) -> int:
     problem = read_problem(path, settings(options.set), starts=options.starts, no_code=options.no_code)
     with progress_bar(options.quiet) as progress:
         found = run_fit(problem, workers=options.workers, progress=progress)
-    made = _no_nan(report(found))
+    made = finite(report(found))
     base = target.with_suffix("") if target else Path(problem.name)
     pictures = write_pictures(found, base) if options.plot else []
     if target is not None:
@@ -53,13 +53,6 @@ def run(options: argparse.Namespace) -> int:
         if written:
             print("\n" + "\n".join(f"  wrote {each}" for each in written))
     return DONE
-
-
-def _no_nan(value: Any) -> Any:
-    """Lists too: JSON knows neither NaN nor infinity."""
-    if isinstance(value, dict):
-        return {key: _no_nan(each) for key, each in value.items()}
-    return [_no_nan(each) for each in value] if isinstance(value, list) else finite(value)
 
 
 def _whole(text: str) -> int:

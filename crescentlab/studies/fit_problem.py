@@ -11,9 +11,7 @@ import numpy as np
 
 from crescentlab.analysis.outcome import Outcome
 from crescentlab.circuit import Circuit, load
-from crescentlab.elaborate import Design
 from crescentlab.errors import InputError, Place, UnitError, nearest
-from crescentlab.netlist import Netlist
 from crescentlab.studies.fit_data import Table, read_table
 from crescentlab.studies.fit_file import FitFile, ParameterSection, read_fit_file
 from crescentlab.studies.fit_scales import Data, Scale
@@ -25,7 +23,6 @@ from crescentlab.yaml_text import Node
 
 TIME = "time"
 """The column whose presence makes the data series over time."""
-MOST_DESIGNS = 32
 _LEADING_NUMBER = re.compile(r"\s*[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?\s*")
 
 
@@ -109,24 +106,6 @@ def read_problem(
     return _Reading(file, node, path, dict(settings or {}), no_code).problem(starts or file.starts)
 
 
-class _Remembering(Circuit):
-    """A circuit that keeps its latest designs: a run asks for the same several times, and each is read from text."""
-
-    def __init__(self, netlist: Netlist, no_code: bool) -> None:
-        super().__init__(netlist, no_code=no_code)
-        self._latest: dict[tuple[tuple[str, str], ...], Design] = {}
-
-    def design(self, parameters: Mapping[str, str] | None = None) -> Design:
-        key = tuple(sorted((parameters or {}).items()))
-        found = self._latest.get(key)
-        if found is None:
-            found = super().design(parameters)
-            for old in list(self._latest)[: max(0, len(self._latest) - MOST_DESIGNS)]:
-                self._latest.pop(old, None)
-            self._latest[key] = found
-        return found
-
-
 class _Reading:
     """Makes a problem of the sections, one after another."""
 
@@ -139,8 +118,7 @@ class _Reading:
     def load(self, no_code: bool) -> Circuit:
         beside = self.path.parent / self.file.circuit
         try:
-            found = load(beside if beside.is_file() else self.file.circuit, no_code=no_code)
-            return _Remembering(found.netlist, no_code)
+            return load(beside if beside.is_file() else self.file.circuit, no_code=no_code)
         except InputError as error:
             raise error.at(self.node.place_of("circuit")) from None
 
