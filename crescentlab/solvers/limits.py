@@ -62,6 +62,7 @@ class PressureLimits:
         )
         if not tension[k]:
             raise SimulationError(
-                f"{said}; the oil would cavitate: feed this volume better, or write tension: true in the fluid to go on"
+                f"{said}; the oil would cavitate: feed this volume better, choose a fluid that evaporates, or write "
+                "tension: true in the fluid to go on"
             )
         return said
