@@ -33,6 +33,7 @@ NATIVE = (
     "-shared",
     "-fno-math-errno",
     "-fno-semantic-interposition",
+    "-fno-tree-slp-vectorize",  # GCC 12 with AVX-512 mixes lanes up; what is worth it is gathered by hand (wide.h)
     "-freciprocal-math",
     "-march=native",
 )
