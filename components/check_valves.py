@@ -3,12 +3,13 @@
 from pydantic import Field
 
 from crescentlab.component import Component, Equations
-from crescentlab.domain import observable, takes_pressure
+from crescentlab.domain import observable, reads_pressure, takes_pressure
 from crescentlab.fluid import Fluid
 from crescentlab.maths import Expr, maximum, minimum
-from crescentlab.units import Area, Flow, Length, Pressure, Ratio
+from crescentlab.units import Area, Flow, FlowConductance, Length, Pressure, Ratio
 
 from .flow_laws import DIAMETER_ROUNDING, hydraulic_diameter_of, orifice_flow
+from .valve_laws import Metering, clipped
 
 
 class CheckValve(Component):
@@ -43,4 +44,57 @@ class CheckValve(Component):
         area = lift * self.area
         d_h = hydraulic_diameter_of(area, self.diameter_rounding)
         q = self.parallel * orifice_flow(p_a, p_b, area, d_h, self.cd_max, self.lambda_c, fluid)
+        return {"q_a": q, "q_b": -q, "q": q, "lift": lift}
+
+
+class IdealCheckValve(Component):
+    r"""Ideal check valve: almost no resistance forwards, nothing backwards.
+
+    .. math:: q = G\, \max(p_a - p_b, 0)
+
+    p [Pa] gauge; G = `conductance` [m^3/(s Pa)], large: the drop that it costs is q/G. Not where the drop or the
+    opening of the valve matters (`check_valve`). Source: definition of a one-way resistance.
+    """
+
+    conductance: FlowConductance = Field(
+        default=1e-7, gt=0, description="flow over drop, forwards; 60 L/min at 0.1 bar"
+    )
+
+    a = takes_pressure("inlet")
+    b = takes_pressure("outlet")
+    q = observable(Flow, "flow from a to b")
+
+    def equations(self, p_a: Expr, p_b: Expr) -> Equations:
+        q = self.conductance * maximum(p_a - p_b, 0.0)
+        return {"q_a": q, "q_b": -q, "q": q}
+
+
+class PilotOperatedCheckValve(Metering, Component):
+    r"""Check valve that a pilot pressure can open backwards; without mass.
+
+    .. math:: q = C_d\, s A \sqrt{2|\Delta p|/\rho}\, \mathrm{sign}\,\Delta p, \quad
+              s = \min(\max((\Delta p + R (p_x - p_a) - p_c)/p_r, 0), 1)
+
+    \Delta p = p_a - p_b [Pa]; p_x [Pa] of the pilot; R = `pilot_ratio` [-], area of the pilot piston over that of the
+    seat; p_c = `cracking_pressure`, p_r = `opening_range` [Pa]; A = `area` [m^2]; s = `lift` [-]; C_d [-] follows the
+    flow number as in `check_valve`; \rho [kg/m^3] at the mean pressure. Against a load p_b it opens backwards from
+    p_x = p_a + (p_b - p_a + p_c)/R on. The pilot port takes no fluid; its piston's other side is under p_a. Not for a
+    decompression poppet, the motion of poppet and piston, nor leakage.
+    Source: balance of forces on poppet and pilot piston; ISO 1219-1, pilot-operated non-return valve.
+    """
+
+    cracking_pressure: Pressure = Field(default=0.2e5, ge=0, description="drop at which the poppet leaves its seat")
+    opening_range: Pressure = Field(gt=0, description="further drop until it is fully open")
+    pilot_ratio: Ratio = Field(default=3.0, gt=0, description="area of the pilot piston over that of the seat")
+
+    a = takes_pressure("inlet")
+    b = takes_pressure("outlet, where the load is held")
+    pilot = reads_pressure("pilot port X")
+    q = observable(Flow, "flow from a to b")
+    lift = observable(Ratio, "share of the full opening")
+
+    def equations(self, p_a: Expr, p_b: Expr, p_pilot: Expr, fluid: Fluid) -> Equations:
+        opens = p_a - p_b + self.pilot_ratio * (p_pilot - p_a)
+        lift = clipped((opens - self.cracking_pressure) / self.opening_range)
+        q = self.metered(p_a, p_b, lift, fluid)
         return {"q_a": q, "q_b": -q, "q": q, "lift": lift}

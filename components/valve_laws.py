@@ -1,0 +1,138 @@
+"""Laws that valves share: edges that open, jets, and how a moving part follows what drives it. No components here.
+
+All work on floats and symbols, in SI; every Jacobian is finite, also where a valve starts to open.
+"""
+
+from dataclasses import dataclass
+from typing import Any, Literal
+
+from pydantic import BaseModel, Field
+
+from crescentlab.fluid import Fluid
+from crescentlab.maths import hypot, maximum, minimum, pi, sqrt, when, where
+from crescentlab.units import Angle, Area, Length, Pressure, Ratio
+
+from .flow_laws import DIAMETER_ROUNDING, hydraulic_diameter_of, orifice_flow
+
+Direction = Literal["up", "down"]
+"""Whether an edge opens towards increasing x or decreasing x."""
+
+
+class Metering(BaseModel):
+    """What a valve that meters through one area is described by."""
+
+    area: Area = Field(ge=0, description="flow area when fully open")
+    cd_max: Ratio = Field(default=0.7, gt=0, le=1, description="largest discharge coefficient")
+    lambda_c: Ratio = Field(default=100.0, gt=0, description="critical flow number")
+    diameter_rounding: Length = Field(default=DIAMETER_ROUNDING, gt=0, description="rounding of the diameter at 0 area")
+
+    def metered(self, p_a: Any, p_b: Any, share: Any, fluid: Fluid) -> Any:
+        """Flow [m^3/s] from a to b through `share` [-] of the area, below 0 counted as 0."""
+        area = self.area * maximum(share, 0.0)
+        d_h = hydraulic_diameter_of(area, self.diameter_rounding)
+        return orifice_flow(p_a, p_b, area, d_h, self.cd_max, self.lambda_c, fluid)
+
+
+class Jet(BaseModel):
+    """What the jet at a moving edge is described by."""
+
+    cd_max: Ratio = Field(default=0.7, gt=0, le=1, description="largest discharge coefficient")
+    lambda_c: Ratio = Field(default=100.0, gt=0, description="critical flow number")
+    jet_coefficient: Ratio = Field(default=1.0, description="correction of the flow force; 0: none, below 0: it opens")
+    edge_rounding: Length = Field(default=1e-6, gt=0, description="opening over which the area begins to grow")
+    drop_rounding: Pressure = Field(default=100.0, gt=0, description="rounding of the jet's velocity at zero drop")
+
+    def jet(self, p_a: Any, p_b: Any, area: Any, hydraulic_diameter: Any, cosine: Any, fluid: Fluid) -> "Issue":
+        r"""What passes an edge, and the momentum of the jet along the axis.
+
+        .. math:: q = C_d A v_{jet}, \quad F = k \rho |q| v_{jet} \cos\vartheta, \quad v_{jet} = \sqrt{2|\Delta p|/\rho}
+
+        A = `area` [m^2]; `cosine` = cos \vartheta [-] of the jet's angle to the axis; k = `jet_coefficient` [-].
+        """
+        rho = fluid.density((p_a + p_b) / 2)
+        speed = orifice_flow(p_a, p_b, 1.0, hydraulic_diameter, self.cd_max, self.lambda_c, fluid)
+        q, rounded = area * speed, hypot(p_a - p_b, self.drop_rounding)
+        jet_velocity = (p_a - p_b) * sqrt(2 / (rho * rounded))
+        return Issue(q, self.jet_coefficient * rho * q * jet_velocity * cosine, rho * speed)
+
+
+@dataclass(frozen=True)
+class Issue:
+    """What passes an edge."""
+
+    q: Any
+    """Flow from a to b [m^3/s]."""
+    force: Any
+    """Flow force towards closing [N]."""
+    mass_flux: Any
+    """Mass flow per uncovered area [kg/(s m^2)], of the sign of q."""
+
+
+class SpoolEdge(Jet):
+    """What the edge of a spool is described by, besides the shape of what it uncovers."""
+
+    opens: Direction = Field(default="up", description="where it opens: up is towards increasing x")
+    overlap: Length = Field(default=0.0, description="travel from x = 0 until the edge starts to open")
+    jet_angle: Angle = Field(
+        default=69 * pi / 180, ge=0, le=pi / 2,
+        description="angle of the jet to the spool's axis: 69 deg for sharp edges (von Mises)",
+    )  # fmt: skip
+    damping_length: Length = Field(
+        default=0.0, description="from the edge to the other port, counted into side a; below 0 into side b"
+    )
+
+
+def opening(travel: Any, rounding: Any) -> tuple[Any, Any]:
+    r"""Opening [m] of an edge after `travel` [m] from where it starts, and its slope [-].
+
+    .. math:: h = x \quad (x \ge w), \qquad h = w (2 s^2 - s^3), \quad s = x/w \quad (0 < x < w), \qquad
+              h = 0 \quad (x \le 0)
+
+    w = `rounding` [m]: the slope is continuous.
+    """
+    s = minimum(maximum(travel / rounding, 0.0), 1.0)
+    return rounding * s * s * (2 - s) + maximum(travel - rounding, 0.0), s * (4 - 3 * s)
+
+
+def limited(travel: Any, slope: Any, longest: Any) -> tuple[Any, Any]:
+    """An opening and its slope that end at the `longest` [m]."""
+    return minimum(travel, longest), where(travel < longest, slope, 0.0)
+
+
+def edge_share(stroke: Any, overlap: Any, rounding: Any) -> Any:
+    r"""Open share [-] of a valve's edge at a stroke [-] of -1 to 1.
+
+    .. math:: s = \frac{y}{1 - u}, \quad y = x - u \ (x > u + w), \quad y = \frac{(x - u + w)^2}{4 w} \ (|x - u| \le w),
+              \quad y = 0 \ (x < u - w)
+
+    u = `overlap`, w = `rounding` > 0, both as shares of the stroke; s is 1 at full stroke, x = 1.
+    """
+    y = minimum(maximum(stroke, -1.0), 1.0) - overlap
+    round_part = minimum(maximum(y + rounding, 0.0), 2 * rounding)
+    return (round_part * round_part / (4 * rounding) + maximum(y - rounding, 0.0)) / (1 - overlap)
+
+
+def clipped(value: Any, low: float = 0.0, high: float = 1.0) -> Any:
+    """`value` within low and high."""
+    return minimum(maximum(value, low), high)
+
+
+def follower(
+    position: Any, rate: Any, at: Any, target: Any, omega: Any, damping_ratio: Any, low: float
+) -> dict[str, Any]:
+    r"""Derivatives and events of the states `position` [-], `rate` [1/s], held `at`, of a driven moving part.
+
+    .. math:: \frac{d^2 x}{dt^2} = \omega^2 (x_t - x) - 2 \zeta \omega \frac{dx}{dt}, \quad x_{low} \le x \le 1
+
+    x_t = `target` [-], counted within the stops; \omega [rad/s]; \zeta = `damping_ratio` [-]. At a stop it rests until
+    the target leads away from it. at: -1 rests on the low stop, 1 on the high one, 0 free.
+    """
+    pull = omega * omega * (clipped(target, low) - position) - 2 * damping_ratio * omega * rate
+    free = at == 0
+    return {
+        "der_position": rate,
+        "der_rate": where(free, pull, 0.0),
+        "hits_low": when(free & (position < low), position=low, rate=0.0, at=-1.0),
+        "hits_high": when(free & (position > 1.0), position=1.0, rate=0.0, at=1.0),
+        "leaves": when((at == -1) & (target > low) | (at == 1) & (target < 1.0), at=0.0),
+    }

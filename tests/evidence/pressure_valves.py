@@ -1,0 +1,201 @@
+"""Pressure valves."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+from building import OIL, circuit
+from crescentlab.components.fluids import SimpleOil
+from crescentlab.components.pressure_valves import CounterbalanceValve, ReliefValve, SecondOrderReliefValve
+from scipy.optimize import brentq
+
+from crescentlab.result import Result
+from evidence import Number, evidence
+
+BAR, LPM, RHO = 1e5, 1e-3 / 60, 860.0
+HARD = {**OIL, "bulk_modulus": "1e9 bar"}
+SOFT = {"type": "elastic_capacity", "diameter": "80 mm", "length": "1 m", "wall_thickness": "0.4 mm"}
+"""5 L that give way as oil of 12 000 bar would, so that the fluid itself may be rigid."""
+STIFF = SimpleOil(density=RHO, kinematic_viscosity=35e-6, bulk_modulus=1e15)
+
+
+def rest(parts: dict[str, Any], nets: dict[str, list[str]], stop: str = "200 ms") -> Result:
+    """A run long enough for the lags of 5 ms to be over."""
+    return circuit(components=parts, nets=nets, fluid=HARD, simulation={"stop": stop}).simulate(rtol=1e-8)
+
+
+def through(area: float, drop: float) -> float:
+    """Cd A sqrt(2 dp/rho) [m^3/s] with Cd 0.7."""
+    return 0.7 * area * math.sqrt(2 * drop / RHO)
+
+
+@evidence(
+    "relief_valve",
+    "second_order_relief_valve",
+    source="balance at rest: q = Cd A (dp - p_c)/p_r sqrt(2 dp/rho), solved for dp",
+    tolerance=1e-5,
+    because="tanh(2 lambda/lambda_c) is 1 to 1e-6 here; tolerance of the run",
+)
+def relief() -> list[Number]:
+    """Pressure that 20 mm^2, cracking at 100 bar, fully open 20 bar above, regulates at 10 and 40 L/min."""
+    found = []
+    settings = {"area": "20 mm^2", "cracking_pressure": "100 bar", "opening_range": "20 bar"}
+    for valve in (
+        {"type": "relief_valve", **settings},
+        {"type": "second_order_relief_valve", **settings, "natural_frequency": "100 Hz"},
+    ):
+        for flow in (10, 40):
+            run = rest(
+                {
+                    "pump": {"type": "flow_source", "flow": f"{flow} L/min"}, "tank": {"type": "tank"},
+                    "line": {**SOFT, "start": {"p": "100 bar"}}, "valve": valve,
+                },
+                {"p": ["pump.port", "line.port", "valve.a"], "t": ["valve.b", "tank.port"]},
+                "1 s",
+            )  # fmt: skip
+            expected = brentq(
+                lambda p, q=flow: through(20e-6 * (p / BAR - 100) / 20, p) - q * LPM, 100 * BAR, 120 * BAR, xtol=1e-3
+            )
+            found.append(Number(f"{valve['type']}, {flow} L/min", expected, float(run["line.p"][-1]), "bar"))
+    return found
+
+
+@evidence(
+    "relief_valve",
+    "second_order_relief_valve",
+    source="first-order lag, (s_0 - s)/T; second-order, omega^2 (s_0 - s) - 2 zeta omega ds/dt",
+    tolerance=1e-9,
+    because="rounding",
+)
+def motion() -> list[Number]:
+    """Rates at 105 bar (s_0 = 0.25) and s = 0.1: T = 4 ms; 50 Hz, zeta 0.5, moving at 20/s."""
+    settings = {"area": 20e-6, "cracking_pressure": 100 * BAR, "opening_range": 20 * BAR}
+    at = {"p_a": 105 * BAR, "p_b": 0.0, "fluid": STIFF}
+    first = ReliefValve(**settings, time_constant=4e-3).equations(lift=0.1, **at)
+    second = SecondOrderReliefValve(**settings, natural_frequency=50.0, damping_ratio=0.5).equations(
+        position=0.1, rate=20.0, at=0.0, **at
+    )
+    omega = 100 * math.pi
+    return [
+        Number("relief_valve", 0.15 / 4e-3, first["der_lift"]),
+        Number("second_order_relief_valve", omega**2 * 0.15 - omega * 20, second["der_rate"]),
+    ]
+
+
+@evidence(
+    "reducing_valve",
+    "reducing_relieving_valve",
+    source="two orifices in series, the first open by (p_c - p)/p_r: A_1^2 s^2 (p_s - p) = A_2^2 p, solved for p",
+    tolerance=1e-5,
+    because="tanh(2 lambda/lambda_c) is 1 to 1e-6 here; tolerance of the run",
+)
+def reduced() -> list[Number]:
+    """Reduced pressure set to 50 bar (range 10 bar, 20 mm^2), 200 bar before, orifices of 1 and 5 mm^2 behind."""
+    found = []
+    for kind, inlet, outlet, tank in (
+        ("reducing_valve", "a", "b", "drain"), ("reducing_relieving_valve", "supply", "outlet", "tank"),
+    ):  # fmt: skip
+        for area in (1, 5):
+            valve = {"type": kind, "area": "20 mm^2", "set_pressure": "50 bar", "closing_range": "10 bar"}
+            run = rest(
+                {
+                    "supply": {"type": "pressure_source", "pressure": "200 bar"}, "tank": {"type": "tank"},
+                    "line": SOFT,
+                    "valve": valve, "user": {"type": "orifice", "area": f"{area} mm^2"},
+                },
+                {
+                    "s": ["supply.port", f"valve.{inlet}"], "p": [f"valve.{outlet}", "line.port", "user.a"],
+                    "t": ["user.b", "tank.port", f"valve.{tank}"],
+                },
+                "1 s",
+            )  # fmt: skip
+            expected = brentq(
+                lambda p, a=area: 20 * (50 - p) / 10 * math.sqrt(200 - p) - a * math.sqrt(p), 40, 50, xtol=1e-9
+            )
+            found.append(Number(f"{kind}, {area} mm^2", expected * BAR, float(run["line.p"][-1]), "bar"))
+    return found
+
+
+@evidence(
+    "reducing_relieving_valve",
+    source="orifice open by (p - p_c - p_u)/p_r: q = Cd A s sqrt(2 p/rho), solved for p",
+    tolerance=1e-5,
+    because="tanh(2 lambda/lambda_c) is 1 to 1e-6 here; tolerance of the run",
+)
+def relieving() -> list[Number]:
+    """Outlet set to 50 bar (range 10 bar, dead band 3 bar, 20 mm^2) into which 20 L/min are driven."""
+    run = rest(
+        {
+            "supply": {"type": "pressure_source", "pressure": "200 bar"}, "tank": {"type": "tank"},
+            "line": SOFT,
+            "valve": {"type": "reducing_relieving_valve", "area": "20 mm^2", "set_pressure": "50 bar",
+                      "closing_range": "10 bar", "dead_band": "3 bar"},
+            "back": {"type": "flow_source", "flow": "20 L/min"},
+        },
+        {
+            "s": ["supply.port", "valve.supply"], "p": ["valve.outlet", "line.port", "back.port"],
+            "t": ["tank.port", "valve.tank"],
+        },
+        "1 s",
+    )  # fmt: skip
+    expected = brentq(lambda p: through(20e-6 * (p / BAR - 53) / 10, p) - 20 * LPM, 53 * BAR, 63 * BAR, xtol=1e-3)
+    return [Number("outlet", expected, float(run["line.p"][-1]), "bar")]
+
+
+@evidence(
+    "counterbalance_valve",
+    source="balance of forces: p_a + R p_x = p_c + (1 + R) p_b, without the last term where it is vented",
+    tolerance=1e-6,
+    because="root of the equations, located to 1e-9",
+)
+def counterbalance() -> list[Number]:
+    """Pilot pressure at which a load of 47 bar begins to go down: set to 70 bar, ratio 3, against 0 and 5 bar."""
+    found = []
+    for vented, back in ((False, 0.0), (False, 5.0), (True, 5.0)):
+        valve = CounterbalanceValve(
+            area=20e-6, set_pressure=70 * BAR, opening_range=30 * BAR, pilot_ratio=3.0, vented=vented
+        )
+
+        def rate(pilot: float, valve: CounterbalanceValve = valve, back: float = back) -> float:
+            at = {"p_a": 47 * BAR, "p_b": back * BAR, "lift": 0.5, "fluid": STIFF}
+            return float(valve.equations(p_pilot=pilot, **at)["der_lift"] * valve.time_constant + 0.5 - 1e-6)
+
+        expected = (70 - 47 + (0.0 if vented else 4 * back)) / 3
+        name = f"{'vented' if vented else 'not vented'}, {back:g} bar behind"
+        found.append(Number(name, (expected + 1e-6 * 10) * BAR, brentq(rate, 0.0, 30 * BAR, rtol=1e-9), "bar"))
+    return found
+
+
+@evidence(
+    "pressure_compensator",
+    source="two orifices in series, the first open by (p_c + p_r - d)/p_r: A_1^2 s^2 (p_s - p_l - d) = A_2^2 d, solved "
+    "for the drop d over the metering edge; beyond the spring's range d = (p_s - p_l) A_1^2/(A_1^2 + A_2^2)",
+    tolerance=1e-5,
+    because="tanh(2 lambda/lambda_c) is 1 to 1e-6 here; tolerance of the run",
+)
+def compensated() -> list[Number]:
+    """Flow from 200 bar to loads of 0, 100, 195 bar: 10.4 mm^2 behind a compensator of 37.7 mm^2, 8 and 2 bar."""
+    found = []
+    for load in (0, 100, 195):
+        run = rest(
+            {
+                "supply": {"type": "pressure_source", "pressure": "200 bar"},
+                "load": {"type": "pressure_source", "pressure": f"{load} bar"},
+                "line": {**SOFT, "diameter": "2 mm", "start": {"p": f"{load + 5} bar"}},
+                "valve": {"type": "pressure_compensator", "area": "37.7 mm^2", "control_pressure": "8 bar",
+                          "closing_range": "2 bar", "start": {"lift": "0.1"}},
+                "edge": {"type": "orifice", "area": "10.4 mm^2"},
+            },
+            {
+                "s": ["supply.port", "valve.a"], "m": ["valve.b", "line.port", "edge.a"],
+                "l": ["edge.b", "load.port", "valve.load"],
+            },
+        )  # fmt: skip
+        drop = (200 - load) * 37.7**2 / (37.7**2 + 10.4**2)
+        if drop > 8:
+            drop = brentq(
+                lambda d, p=load: 37.7 * (10 - d) / 2 * math.sqrt(200 - p - d) - 10.4 * math.sqrt(d), 8, 10, xtol=1e-9
+            )
+        found.append(Number(f"load {load} bar", through(10.4e-6, drop * BAR), float(run["edge.q"][-1]), "L/min"))
+    return found

@@ -1,0 +1,293 @@
+"""Valves: limits, events, signs, conservation; their figures are in `evidence`."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+import pytest
+from building import OIL as OIL_TEXT
+from building import circuit, fired
+from crescentlab.components.check_valves import IdealCheckValve, PilotOperatedCheckValve
+from crescentlab.components.directional_valves import FourThreeValve, SpoolDrive, ThreeTwoValve, TwoTwoValve
+from crescentlab.components.fluids import SimpleOil
+from crescentlab.components.pressure_valves import (
+    CounterbalanceValve,
+    PressureCompensator,
+    ReducingRelievingValve,
+    ReducingValve,
+    ReliefValve,
+    SecondOrderReliefValve,
+)
+from crescentlab.components.shuttle_valves import ShuttleValve
+from scipy.optimize import brentq
+
+from crescentlab.result import Result
+
+BAR, MS = 1e5, 1e-3
+OIL = SimpleOil(density=860.0, kinematic_viscosity=35e-6, bulk_modulus=1.4e9)
+STIFF = SimpleOil(density=860.0, kinematic_viscosity=35e-6, bulk_modulus=1e15)
+
+
+def through(area: float, drop: float) -> float:
+    """Cd A sqrt(2 dp/rho) with Cd 0.7 and 860 kg/m^3."""
+    return 0.7 * area * math.sqrt(2 * drop / 860)
+
+
+# --- directional valves -----------------------------------------------------------------------------------------------
+
+
+def four(x: float, valve: FourThreeValve, **pressures: float) -> dict[str, Any]:
+    given = {"p_supply": 100 * BAR, "p_a": 60 * BAR, "p_b": 40 * BAR, "p_tank": 2 * BAR} | pressures
+    return valve.equations(stroke=x, fluid=OIL, **given)
+
+
+@pytest.mark.parametrize("x", [-1.5, -1.0, -0.3, 0.0, 0.2, 1.0, 1.5])
+@pytest.mark.parametrize("overlap", [-0.1, 0.0, 0.1])
+def test_four_three_valve_keeps_nothing(x: float, overlap: float) -> None:
+    """What enters leaves; turned round, the valve is its own mirror image with A and B exchanged."""
+    valve = FourThreeValve(area=10e-6, overlap=overlap)
+    got = four(x, valve)
+    assert sum(got[f"q_{p}"] for p in ("supply", "a", "b", "tank")) == pytest.approx(0.0, abs=1e-18)
+    mirror = four(-x, valve, p_a=40 * BAR, p_b=60 * BAR)
+    assert got["q_supply_a"] == mirror["q_supply_b"]
+    assert got["q_b_tank"] == mirror["q_a_tank"]
+
+
+def test_centres_of_a_four_three_valve() -> None:
+    """In the middle: closed by overlap; open by underlap; floating where only the tank edges underlap."""
+    closed = four(0.0, FourThreeValve(area=10e-6, overlap=0.1))
+    assert all(closed[f"q_{p}"] == 0 for p in ("supply", "a", "b", "tank"))
+    opened = four(0.0, FourThreeValve(area=10e-6, overlap=-0.1))
+    for edge, drop in (("q_supply_a", 40), ("q_supply_b", 60), ("q_a_tank", 58), ("q_b_tank", 38)):
+        assert opened[edge] == pytest.approx(through(1e-6 / 1.1, drop * BAR), rel=5e-3)
+    floating = four(0.0, FourThreeValve(area=10e-6, overlap=0.1, tank_overlap=-0.1))
+    assert floating["q_supply"] == 0
+    assert floating["q_a_tank"] == opened["q_a_tank"]
+
+
+def test_area_ratio_of_a_four_three_valve() -> None:
+    """Edges at B of half the area pass half the flow, at the same drop."""
+    even, half = FourThreeValve(area=10e-6), FourThreeValve(area=10e-6, area_ratio=0.5)
+    assert four(1.0, half)["q_b_tank"] == pytest.approx(0.5 * four(1.0, even)["q_b_tank"], rel=1e-3)
+    assert four(1.0, half)["q_supply_a"] == four(1.0, even)["q_supply_a"]
+
+
+@pytest.mark.parametrize(("x", "into", "out"), [(0.0, 0.0, 1.0), (0.5, 0.0, 0.0), (1.0, 1.0, 0.0)])
+def test_three_two_valve_at_its_ends(x: float, into: float, out: float) -> None:
+    """Stroke 0 joins work port and tank, 1 supply and work port; in the middle both are shut by the overlap."""
+    valve = ThreeTwoValve(area=10e-6, overlap=0.1)
+    got = valve.equations(p_supply=100 * BAR, p_work=50 * BAR, p_tank=0.0, stroke=x, fluid=OIL)
+    full = through(10e-6, 50 * BAR)
+    assert got["q_in"] == pytest.approx(into * full, rel=5e-3)
+    assert got["q_out"] == pytest.approx(out * full, rel=5e-3)
+    assert got["q_supply"] + got["q_work"] + got["q_tank"] == pytest.approx(0.0, abs=1e-18)
+
+
+def test_two_two_valve_shut_and_beyond() -> None:
+    """Nothing passes below its overlap or at a negative stroke; a stroke beyond 1 opens no further."""
+    valve = TwoTwoValve(area=10e-6, overlap=0.05)
+    q = [valve.equations(p_a=50 * BAR, p_b=0.0, stroke=x, fluid=OIL)["q"] for x in (-0.5, 0.04, 1.0, 3.0)]
+    assert q[:2] == [0.0, 0.0]
+    assert q[2] == q[3] == pytest.approx(through(10e-6, 50 * BAR), rel=5e-3)
+
+
+# --- the drive --------------------------------------------------------------------------------------------------------
+
+
+def driven(command: dict[str, str], stop: str, **settings: str) -> Result:
+    parts = {"asked": command, "drive": {"type": "spool_drive", "natural_frequency": "50 Hz", **settings}}
+    made = circuit(components=parts, nets={"u": ["asked.y", "drive.command"]}, simulation={"stop": stop})
+    return made.simulate(rtol=1e-8)
+
+
+def test_drive_stops_at_the_end_of_its_stroke() -> None:
+    """A full step with damping ratio 0.2 would overshoot by exp(-pi zeta/sqrt(1 - zeta^2)) = 53 %: it rests at 1."""
+    run = driven({"type": "step", "after": "1"}, "100 ms", damping_ratio="0.2")
+    omega, zeta = 100 * math.pi, 0.2
+    wd = omega * math.sqrt(1 - zeta**2)
+
+    def short(t: float) -> float:
+        return math.cos(wd * t) + zeta * omega / wd * math.sin(wd * t)
+
+    (hit,) = fired(run, "drive.hits_high")
+    assert hit == pytest.approx(brentq(short, 0.1 / wd, math.pi / wd), rel=1e-6)
+    assert run["drive.position"].max() == pytest.approx(1.0, rel=1e-9)
+    assert run["drive.position"][-1] == 1.0
+    assert run["drive.rate"][-1] == 0.0
+
+
+def test_drive_leaves_its_stop() -> None:
+    """Back from the stop as from rest: after a pulse beyond the stroke it follows 1 - y(t) of the step response."""
+    command = {"type": "pulse", "high": "1.5", "low": "0.5", "width": "100 ms"}
+    run = driven(command, "120 ms", damping_ratio="0.2")
+    (left,) = fired(run, "drive.leaves")
+    assert left == pytest.approx(0.1, rel=1e-9)
+    omega, zeta, t = 100 * math.pi, 0.2, 10 * MS
+    wd = omega * math.sqrt(1 - zeta**2)
+    y = math.exp(-zeta * omega * t) * (math.cos(wd * t) + zeta * omega / wd * math.sin(wd * t))
+    after = run.time >= 0.1
+    got = np.interp(0.11, run.time[after], run["drive.position"][after])
+    assert got == pytest.approx(0.5 + 0.5 * y, abs=1e-3)
+
+
+def test_command_is_counted_within_the_stroke() -> None:
+    """A command of 5 pulls no harder than one of 1."""
+    drive = SpoolDrive(natural_frequency=50.0)
+    there = {"position": 0.2, "rate": 0.0, "at": 0.0}
+    assert drive.equations(command=5.0, **there)["der_rate"] == drive.equations(command=1.0, **there)["der_rate"]
+
+
+# --- pressure valves --------------------------------------------------------------------------------------------------
+
+
+def test_static_characteristics() -> None:
+    """Openings that the pressures ask for: shut on one side of the range, open on the other, half in its middle."""
+    common = {"area": 10e-6, "time_constant": 1.0}
+    relief = ReliefValve(cracking_pressure=100 * BAR, opening_range=20 * BAR, **common)
+    reducing = ReducingValve(set_pressure=50 * BAR, closing_range=10 * BAR, **common)
+    compensator = PressureCompensator(control_pressure=8 * BAR, closing_range=2 * BAR, **common)
+    for excess, share in ((-5, 0.0), (0, 0.0), (0.5, 0.5), (1, 1.0), (5, 1.0)):
+        got = relief.equations(p_a=(100 + 20 * excess) * BAR, p_b=0.0, lift=0.0, fluid=OIL)["der_lift"]
+        assert got == pytest.approx(share, abs=1e-12)
+        got = reducing.equations(p_a=200 * BAR, p_b=(53 - 10 * excess) * BAR, p_drain=3 * BAR, lift=0.0, fluid=OIL)[
+            "der_lift"
+        ]
+        assert got == pytest.approx(share, abs=1e-12)
+        got = compensator.equations(p_a=200 * BAR, p_b=(70 - 2 * excess) * BAR, p_load=60 * BAR, lift=0.0, fluid=OIL)[
+            "der_lift"
+        ]
+        assert got == pytest.approx(share, abs=1e-12)
+
+
+def test_reducing_relieving_valve_in_its_dead_band() -> None:
+    """Feeds below 50 bar, nothing from there to 53 bar, relieves above; what enters leaves."""
+    valve = ReducingRelievingValve(
+        area=10e-6, set_pressure=50 * BAR, closing_range=10 * BAR, dead_band=3 * BAR, time_constant=1.0
+    )
+    common = {"p_supply": 200 * BAR, "p_tank": 1 * BAR, "fluid": OIL}
+    for p, stroke in ((30, 1.0), (46, 0.5), (51, 0.0), (54, 0.0), (59, -0.5), (80, -1.0)):
+        got = valve.equations(p_outlet=p * BAR, stroke=0.0, **common)
+        assert got["der_stroke"] == pytest.approx(stroke, abs=1e-12)
+        there = valve.equations(p_outlet=p * BAR, stroke=stroke, **common)
+        assert there["q_supply"] + there["q_outlet"] + there["q_tank"] == pytest.approx(0.0, abs=1e-18)
+        assert (there["q_in"] > 0) == (stroke > 0)
+        assert (there["q_out"] > 0) == (stroke < 0)
+
+
+def test_counterbalance_valve_without_pilot_is_a_relief_valve() -> None:
+    """Its load pressure alone opens it from the set pressure on; the back pressure adds 1 + R times itself."""
+    valve = CounterbalanceValve(area=10e-6, set_pressure=70 * BAR, opening_range=30 * BAR, time_constant=1.0)
+    for p_a, p_b, share in ((69, 0, 0.0), (85, 0, 0.5), (120, 0, 1.0), (85, 3, 0.1)):
+        got = valve.equations(p_a=p_a * BAR, p_b=p_b * BAR, p_pilot=0.0, lift=0.0, fluid=OIL)["der_lift"]
+        assert got == pytest.approx(share, abs=1e-12)
+
+
+def relieved(valve: dict[str, str], stop: str) -> Result:
+    """A pump on a line of 1 L at 90 bar, and a relief valve."""
+    parts = {
+        "pump": {"type": "flow_source", "flow": "20 L/min"}, "tank": {"type": "tank"},
+        "line": {"type": "capacity", "volume": "1 L", "start": {"p": "90 bar"}},
+        "valve": {"area": "20 mm^2", "cracking_pressure": "100 bar", "opening_range": "20 bar", **valve},
+    }  # fmt: skip
+    nets = {"p": ["pump.port", "line.port", "valve.a"], "t": ["valve.b", "tank.port"]}
+    return circuit(components=parts, nets=nets, fluid=OIL_TEXT, simulation={"stop": stop}).simulate(rtol=1e-8)
+
+
+def test_relief_valves_agree_at_rest() -> None:
+    """First and second order end at the same pressure, and lose nothing."""
+    first = relieved({"type": "relief_valve"}, "500 ms")
+    second = relieved({"type": "second_order_relief_valve", "natural_frequency": "200 Hz"}, "500 ms")
+    assert first["line.p"][-1] == pytest.approx(second["line.p"][-1], rel=1e-5)
+    for run in (first, second):
+        assert run.balance is not None
+        assert run.balance.circuit < 1e-6
+
+
+def test_second_order_relief_valve_rests_on_its_seat() -> None:
+    """Released half open at its cracking pressure, undamped: on the seat after pi/(2 omega), once, and for good."""
+    parts = {
+        "supply": {"type": "pressure_source", "pressure": "100 bar"}, "tank": {"type": "tank"},
+        "valve": {
+            "type": "second_order_relief_valve", "area": "20 mm^2", "cracking_pressure": "100 bar",
+            "opening_range": "20 bar", "natural_frequency": "50 Hz", "damping_ratio": "0", "start": {"position": "0.5"},
+        },
+    }  # fmt: skip
+    nets = {"p": ["supply.port", "valve.a"], "t": ["valve.b", "tank.port"]}
+    run = circuit(components=parts, nets=nets, fluid=OIL_TEXT, simulation={"stop": "50 ms"}).simulate(rtol=1e-8)
+    assert fired(run, "valve.hits_low") == [pytest.approx(5 * MS, rel=1e-6)]
+    late = run.time > 5.01 * MS
+    assert np.all(run["valve.position"][late] == 0)
+    assert np.all(run["valve.q"][late] == 0)
+
+
+def test_overdriven_relief_valve_stops_at_full_opening() -> None:
+    """At twice the range it goes to 1 and rests there: full flow Cd A sqrt(2 dp/rho)."""
+    valve = SecondOrderReliefValve(
+        area=20e-6, cracking_pressure=100 * BAR, opening_range=20 * BAR, natural_frequency=50.0
+    )
+    there = {"p_a": 140 * BAR, "p_b": 0.0, "fluid": STIFF}
+    stopped = valve.equations(position=1.0, rate=0.0, at=1.0, **there)
+    assert stopped["der_rate"] == 0.0
+    assert not stopped["leaves"].condition
+    assert stopped["q"] == pytest.approx(through(20e-6, 140 * BAR), rel=1e-6)
+    assert valve.equations(position=1.0, rate=0.0, at=1.0, **{**there, "p_a": 119 * BAR})["leaves"].condition
+
+
+# --- shuttle and check valves -----------------------------------------------------------------------------------------
+
+
+def test_shuttle_stays_within_its_switching_pressure() -> None:
+    """Inlets of 50 bar, one swinging by 1 bar: with 2 bar of switching pressure the ball never moves, with 0.5 bar it
+    moves twice a period, where the difference passes -0.5 and 0.5 bar."""
+    parts = {
+        "one": {"type": "pressure_source", "pressure": "50 bar"},
+        "swing": {"type": "sine", "mean": "50 bar", "amplitude": "1 bar", "frequency": "10 Hz",
+                  "output_quantity": "pressure"},
+        "two": {"type": "signal_pressure_source"},
+        "valve": {"type": "shuttle_valve", "area": "10 mm^2", "switching_pressure": "0.5 bar"},
+        "user": {"type": "capacity", "volume": "1 L", "start": {"p": "50 bar"}},
+    }  # fmt: skip
+    nets = {
+        "u": ["swing.y", "two.pressure"], "a": ["one.port", "valve.a"], "b": ["two.port", "valve.b"],
+        "o": ["valve.outlet", "user.port"],
+    }  # fmt: skip
+    made = circuit(components=parts, nets=nets, fluid=OIL_TEXT, simulation={"stop": "200 ms"})
+    run = made.simulate()
+    first = math.asin(0.5) / (20 * math.pi)
+    assert fired(run, "valve.to_b") == pytest.approx([first, 0.1 + first], rel=1e-6)
+    assert fired(run, "valve.to_a") == pytest.approx([0.05 + first, 0.15 + first], rel=1e-6)
+    still = made.simulate(parameters={"valve.switching_pressure": "2 bar"})
+    assert fired(still, "valve.to_b") == []
+
+
+def test_shuttle_starts_on_the_right_side() -> None:
+    """With b the higher from the start the ball is there at once, and a passes nothing."""
+    valve = ShuttleValve(area=10e-6)
+    got = valve.equations(p_a=0.0, p_b=50 * BAR, p_outlet=20 * BAR, at=1.0, fluid=OIL)
+    assert got["to_b"].condition
+    assert got["to_b"].then == {"at": -1.0}
+    moved = valve.equations(p_a=0.0, p_b=50 * BAR, p_outlet=20 * BAR, at=-1.0, fluid=OIL)
+    assert moved["q_a"] == 0.0
+    assert moved["q_outlet"] == -moved["q_b"]
+
+
+def test_pilot_operated_check_valve_holds_without_pilot() -> None:
+    """No pilot: nothing back at any load. With the pilot of the inlet itself it is a plain check valve."""
+    valve = PilotOperatedCheckValve(area=10e-6, opening_range=1 * BAR)
+    for load in (10, 100, 300):
+        assert valve.equations(p_a=0.0, p_b=load * BAR, p_pilot=0.0, fluid=OIL)["q"] == 0.0
+    forwards = valve.equations(p_a=20 * BAR, p_b=0.0, p_pilot=20 * BAR, fluid=OIL)
+    assert forwards["lift"] == 1.0
+    assert forwards["q"] == pytest.approx(through(10e-6, 20 * BAR), rel=5e-3)
+
+
+def test_rectifier_of_ideal_check_valves() -> None:
+    """Four in a bridge turn a flow that swings round into one that does not: |q| at every instant."""
+    valve = IdealCheckValve()
+    for drop in (-3 * BAR, -1.0, 0.0, 1.0, 3 * BAR):
+        there = valve.equations(p_a=drop, p_b=0.0)["q"]
+        back = valve.equations(p_a=0.0, p_b=drop)["q"]
+        assert there + back == pytest.approx(1e-7 * abs(drop), rel=1e-12)
+        assert min(there, back) == 0.0
