@@ -21,7 +21,7 @@ from crescentlab.components.frequency_friction import RATES, WEIGHTS, added_iner
 from evidence.distributed_lines import THIN, frequencies, linear, rates
 from scipy.integrate import solve_ivp
 
-from crescentlab.analysis.frequency import frequency_response
+from crescentlab.analysis.linear.frequency import frequency_response
 from crescentlab.domain import State
 from crescentlab.errors import InputError
 

@@ -18,11 +18,11 @@ from crescentlab.components.pipes import (
 
 import crescentlab as cl
 from crescentlab import compiler
-from crescentlab.analysis.activity import activities, indices
 from crescentlab.analysis.doctor import advice, bound_of, examine, mode_text, time_text
-from crescentlab.analysis.line_errors import Ends, chain, line_errors, own_two_port, scattering_error
-from crescentlab.analysis.modes import Mode
-from crescentlab.analysis.run_modes import run_modes
+from crescentlab.analysis.doctor.activity import activities, indices
+from crescentlab.analysis.doctor.line_errors import Ends, chain, line_errors, own_two_port, scattering_error
+from crescentlab.analysis.doctor.run_modes import run_modes
+from crescentlab.analysis.linear.modes import Mode
 from crescentlab.circuit import Circuit
 from crescentlab.cli import main
 from crescentlab.component import Component, Equations

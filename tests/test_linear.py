@@ -16,11 +16,11 @@ from pydantic import Field
 from scipy.linalg import expm
 
 import crescentlab as cl
-from crescentlab.analysis.derivatives import Derivatives, Point
-from crescentlab.analysis.frequency import band, frequency_response, grid
 from crescentlab.analysis.linear import LinearModel, linearize
-from crescentlab.analysis.modes import modes
-from crescentlab.analysis.sampled import block_exponential
+from crescentlab.analysis.linear.derivatives import Derivatives, Point
+from crescentlab.analysis.linear.frequency import band, frequency_response, grid
+from crescentlab.analysis.linear.modes import modes
+from crescentlab.analysis.linear.sampled import block_exponential
 from crescentlab.analysis.steady import steady
 from crescentlab.circuit import Circuit
 from crescentlab.cli import main

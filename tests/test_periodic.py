@@ -11,9 +11,9 @@ from building import alone
 from pydantic import Field
 
 import crescentlab as cl
-from crescentlab.analysis.anderson import Anderson
 from crescentlab.analysis.outcome import Outcome, Window
 from crescentlab.analysis.periodic import periodic, whole_ticks
+from crescentlab.analysis.periodic.anderson import Anderson
 from crescentlab.cli import main
 from crescentlab.component import Component, Equations
 from crescentlab.domain import held, state

@@ -14,11 +14,10 @@ from pydantic import Field
 from scipy.linalg import expm
 
 import crescentlab as cl
-from crescentlab.analysis import collocation
-from crescentlab.analysis.differences import Runs
 from crescentlab.analysis.outcome import Outcome
-from crescentlab.analysis.sensitivity import Sensitivities, sensitivities
-from crescentlab.analysis.variational import monodromy
+from crescentlab.analysis.sensitivity import Sensitivities, collocation, sensitivities
+from crescentlab.analysis.sensitivity.differences import Runs
+from crescentlab.analysis.sensitivity.variational import monodromy
 from crescentlab.circuit import Circuit
 from crescentlab.cli import main
 from crescentlab.component import Component

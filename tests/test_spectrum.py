@@ -11,9 +11,9 @@ import pytest
 from building import OIL, alone, circuit
 
 import crescentlab as cl
-from crescentlab.analysis.dense import Dense
 from crescentlab.analysis.spectrum import Series, spectra, spectra_of_rows
-from crescentlab.analysis.waterfall import waterfalls
+from crescentlab.analysis.spectrum.dense import Dense
+from crescentlab.analysis.spectrum.waterfall import waterfalls
 from crescentlab.cli import main
 from crescentlab.component import Component, Equations
 from crescentlab.domain import gives_signal, observable, reads_rotation, state

@@ -17,8 +17,8 @@ from scipy.optimize import brentq
 from scipy.signal import find_peaks
 
 import crescentlab as cl
-from crescentlab.analysis.newton import DENSE
 from crescentlab.analysis.steady import steady
+from crescentlab.analysis.steady.newton import DENSE
 from crescentlab.circuit import Circuit
 from crescentlab.cli import main
 from crescentlab.component import Component
@@ -162,7 +162,7 @@ def test_the_relief_valve_balances_by_hand():
 def test_the_transient_finds_it_where_nothing_else_may(monkeypatch):
     """The same point to 1e-8, with Newton's method from the closed valve failing and no continuation allowed."""
     point = steady(cl.load("relief_valve"))
-    monkeypatch.setattr("crescentlab.analysis.pseudo_transient.MOST", 0)
+    monkeypatch.setattr("crescentlab.analysis.steady.pseudo_transient.MOST", 0)
     other = steady(cl.load("relief_valve"))
     assert other.method == "transient"
     assert other.steps > 0

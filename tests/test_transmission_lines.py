@@ -15,7 +15,7 @@ from crescentlab.components.fluids import SimpleOil
 from crescentlab.components.transmission_lines import TransmissionLine, TransmissionLineTakesTakes
 from evidence.transmission_lines import FORMS, Ticked
 
-from crescentlab.analysis.frequency import frequency_response
+from crescentlab.analysis.linear.frequency import frequency_response
 from crescentlab.errors import InputError
 
 THIN = SimpleOil(density=870.0, kinematic_viscosity=1e-12, bulk_modulus=1.6e9)

@@ -15,7 +15,7 @@ from crescentlab.components.pipes import Pipe
 from crescentlab.components.two_ports import inertia_factor, line_series, line_shunt, two_port_of
 from scipy.special import ive, jv
 
-from crescentlab.analysis.frequency import Responses, frequency_response
+from crescentlab.analysis.linear.frequency import Responses, frequency_response
 from crescentlab.circuit import Circuit
 from crescentlab.cli import main
 from crescentlab.errors import InputError

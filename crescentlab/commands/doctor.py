@@ -7,7 +7,7 @@ import json
 import math
 
 from crescentlab.analysis.doctor import Examination, advice, bound_of, examine, hertz_text, mode_text, report, time_text
-from crescentlab.analysis.modes import Mode
+from crescentlab.analysis.linear.modes import Mode
 from crescentlab.circuit import load
 from crescentlab.cli import DONE
 from crescentlab.commands import arguments as shared

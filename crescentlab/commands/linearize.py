@@ -10,10 +10,10 @@ from typing import Any
 
 import numpy as np
 
-from crescentlab.analysis.frequency import POINTS, Responses, Transfer, band, frequency_response
-from crescentlab.analysis.frequency_plots import shown_gain, write_frequency_plots
-from crescentlab.analysis.linear_files import UNITS, check_linear_target, document, write
-from crescentlab.analysis.modes import Mode
+from crescentlab.analysis.linear.files import UNITS, check_linear_target, document, write
+from crescentlab.analysis.linear.frequency import POINTS, Responses, Transfer, band, frequency_response
+from crescentlab.analysis.linear.modes import Mode
+from crescentlab.analysis.linear.plots import shown_gain, write_frequency_plots
 from crescentlab.circuit import Circuit, load, snapshot_of
 from crescentlab.cli import DONE
 from crescentlab.commands import arguments as shared

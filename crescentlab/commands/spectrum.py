@@ -13,8 +13,8 @@ from typing import Any
 
 from crescentlab.analysis.periodic import periodic
 from crescentlab.analysis.spectrum import Series, Spectrum, spectra, spectra_of_rows
-from crescentlab.analysis.spectrum_plots import plot_spectra, plot_waterfall
-from crescentlab.analysis.waterfall import HIGHEST_ORDER, REVOLUTIONS, Waterfall, waterfalls
+from crescentlab.analysis.spectrum.plots import plot_spectra, plot_waterfall
+from crescentlab.analysis.spectrum.waterfall import HIGHEST_ORDER, REVOLUTIONS, Waterfall, waterfalls
 from crescentlab.circuit import Circuit, load
 from crescentlab.cli import DONE
 from crescentlab.commands import arguments as shared

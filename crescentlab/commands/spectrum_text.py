@@ -11,8 +11,8 @@ from typing import Any
 import numpy as np
 
 from crescentlab.analysis.spectrum import Spectrum
-from crescentlab.analysis.spectrum_plots import factor
-from crescentlab.analysis.waterfall import Waterfall
+from crescentlab.analysis.spectrum.plots import factor
+from crescentlab.analysis.spectrum.waterfall import Waterfall
 from crescentlab.commands.text import counted, table
 from crescentlab.units import QUANTITIES, Quantity
 

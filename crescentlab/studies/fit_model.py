@@ -13,7 +13,7 @@ from itertools import product
 
 import numpy as np
 
-from crescentlab.analysis.dense import Dense
+from crescentlab.analysis.spectrum.dense import Dense
 from crescentlab.errors import InputError, SimulationError
 from crescentlab.studies.fit_problem import Point, Problem
 from crescentlab.studies.points import DONE, Job, run_point, seconds

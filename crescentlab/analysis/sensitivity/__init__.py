@@ -1,0 +1,10 @@
+"""Derivatives of outcomes by parameters: exact through events, by differences where that does not hold."""
+
+from crescentlab.analysis.sensitivity.sensitivities import (
+    METHODS,
+    Sensitivities,
+    in_units,
+    sensitivities,
+)
+
+__all__ = ["METHODS", "Sensitivities", "in_units", "sensitivities"]
