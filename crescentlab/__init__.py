@@ -7,6 +7,7 @@
     circuit = cl.load("crescent_pump")  # or a path
     result = circuit.simulate(stop="60 ms", parameters={"speed": "3000 rpm"})
     result["delivery.p"], result.time   # numpy, SI
+    point = cl.steady(cl.load("relief_valve"))
 """
 
 from __future__ import annotations
@@ -16,15 +17,27 @@ from typing import TYPE_CHECKING, Any
 __version__ = "0.1.0"
 
 if TYPE_CHECKING:
+    from crescentlab.analysis.linear import linearize
+    from crescentlab.analysis.outcome import Outcome, Window
+    from crescentlab.analysis.periodic import periodic
+    from crescentlab.analysis.sensitivity import sensitivities
+    from crescentlab.analysis.spectrum import spectra
+    from crescentlab.analysis.steady import steady
     from crescentlab.circuit import Circuit, load
     from crescentlab.errors import CrescentlabError, InputError, SimulationError
     from crescentlab.result import Result
 
-__all__ = ["Circuit", "CrescentlabError", "InputError", "Result", "SimulationError", "__version__", "load"]
+__all__ = [
+    "Circuit", "CrescentlabError", "InputError", "Outcome", "Result", "SimulationError", "Window", "__version__",
+    "linearize", "load", "periodic", "sensitivities", "spectra", "steady",
+]  # fmt: skip
 
 _HOMES = {
     "Circuit": "circuit", "load": "circuit", "Result": "result",
     "CrescentlabError": "errors", "InputError": "errors", "SimulationError": "errors",
+    "Outcome": "analysis.outcome", "Window": "analysis.outcome", "linearize": "analysis.linear",
+    "periodic": "analysis.periodic", "sensitivities": "analysis.sensitivity", "spectra": "analysis.spectrum",
+    "steady": "analysis.steady",
 }  # fmt: skip
 
 
