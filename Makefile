@@ -4,6 +4,7 @@
 #   make test      the whole test suite                         make test ARGS="-k units"
 #   make check     formatter, linter and types, changing nothing
 #   make format    let the formatter and the linter mend what they can
+#   make paper     the tables and figures of the pump's paper anew, with verdicts: docs/paper.md (minutes)
 #   make campaign  the tests that take minutes of simulation
 #   make bench     the pump, all solvers, against hand-written C; the other benchmarks: benchmarks/RESULTS.md
 #
@@ -20,7 +21,7 @@ INSTALL = $(BIN)/python -m pip install -qq --disable-pip-version-check -c constr
 TOO_OLD = crescentlab needs Python 3.11 or newer, and $(PYTHON) is %s; name a newer one: make PYTHON=python3.12
 MISSING = crescentlab needs Python 3.11 or newer, and there is no $(PYTHON); name it: make PYTHON=python3.12
 
-.PHONY: help run test campaign check format bench install install-dev
+.PHONY: help run test paper campaign check format bench install install-dev
 .DELETE_ON_ERROR:
 
 help:
@@ -31,6 +32,9 @@ run: install
 
 test: install-dev
 	$(BIN)/pytest -n 2 $(ARGS)
+
+paper: install
+	$(BIN)/python -m studies.paper.make_page $(ARGS)
 
 campaign: install-dev
 	$(BIN)/pytest -n 2 -m campaign $(ARGS)
