@@ -98,9 +98,11 @@ def _fill(reply: Reply, ran: _Ran, job: Job) -> None:
         ran.result.write(Path(job.write))
     if ran.window is None:
         return
-    for name, text in job.measure.items():
+    outcomes = {name: Outcome(name, text) for name, text in job.measure.items()}
+    ran.window.load(n for outcome in outcomes.values() for n in outcome.variables(ran.window.system))
+    for name, outcome in outcomes.items():
         try:
-            value = float(Outcome(name, text).value(ran.window).value)
+            value = float(outcome.value(ran.window).value)
             if math.isfinite(value):
                 reply.outcomes[name] = value
                 continue

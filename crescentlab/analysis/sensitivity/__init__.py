@@ -1,6 +1,6 @@
 """Derivatives of outcomes by parameters: exact through events, by differences where that does not hold."""
 
-from crescentlab.analysis.sensitivity.sensitivities import (
+from crescentlab.analysis.sensitivity.by_parameter import (
     METHODS,
     Sensitivities,
     in_units,
