@@ -1,13 +1,33 @@
-"""Translational mechanics: masses, springs, dampers, forces and imposed motion. No fluid here."""
+"""Translational mechanics: masses, springs, dampers, friction, contacts, forces, imposed motion. No fluid here."""
 
-from typing import Self
+from typing import Any, Self
 
 from pydantic import Field, model_validator
 
+from crescentlab import units
 from crescentlab.component import Component, Equations
 from crescentlab.domain import gives_motion, held, observable, state, takes_motion, takes_signal
-from crescentlab.maths import Expr, fabs, maximum, minimum, when, where
-from crescentlab.units import Damping, Force, Length, Mass, Ratio, Stiffness, Velocity
+from crescentlab.maths import Expr, exp, fabs, maximum, minimum, tanh, when, where
+from crescentlab.units import Damping, Force, Length, Ratio, Stiffness, Velocity
+
+
+class Mass(Component):
+    r"""Mass free to move.
+
+    .. math:: m \frac{dv}{dt} = \sum f, \quad \frac{dx}{dt} = v
+
+    m = `mass` [kg]; x [m], v [m/s]; f [N] on the mass. Not for a mass that meets rigid stops (`mass_with_stops`) or
+    sticks (`stick_slip_mass`). Source: Newton's second law.
+    """
+
+    mass: units.Mass = Field(gt=0, description="moving mass")
+
+    port = gives_motion("the mass")
+    x = state(Length, "position", start=0.0, nominal=1e-3)
+    v = state(Velocity, "velocity", start=0.0, nominal=1e-2)
+
+    def equations(self, x: Expr, v: Expr, f_port: Expr) -> Equations:
+        return {"x_port": x, "v_port": v, "der_x": v, "der_v": f_port / self.mass}
 
 
 class MassWithStops(Component):
@@ -22,7 +42,7 @@ class MassWithStops(Component):
     force of an impact. Source: Newton's second law and law of impact.
     """
 
-    mass: Mass = Field(gt=0, description="moving mass")
+    mass: units.Mass = Field(gt=0, description="moving mass")
     low: Length = Field(default=0.0, description="position of the low stop")
     high: Length = Field(description="position of the high stop")
     restitution: Ratio = Field(default=0.0, ge=0, le=1, description="rebound speed over impact speed")
@@ -74,7 +94,7 @@ class StickSlipMass(Component):
     100-103, with the zero-velocity band replaced by an event.
     """
 
-    mass: Mass = Field(gt=0, description="moving mass")
+    mass: units.Mass = Field(gt=0, description="moving mass")
     coulomb_friction: Force = Field(ge=0, description="friction force while sliding")
     static_friction: Force = Field(ge=0, description="largest friction force while sticking; at least coulomb_friction")
 
@@ -169,6 +189,130 @@ class Damper(Component):
 
     def equations(self, v_rod: Expr) -> Equations:
         return {"f_rod": self.coefficient * v_rod}
+
+
+class DamperBetween(Component):
+    r"""Viscous damper between two moving parts.
+
+    .. math:: F = B (v_b - v_a)
+
+    F [N] tension, pulling a towards +x and b towards -x; B = `coefficient` [N s/m]; v [m/s]. Not for dry friction
+    (`friction_between`). Source: definition of viscous damping.
+    """
+
+    coefficient: Damping = Field(ge=0, description="force per difference of velocities")
+
+    a = takes_motion("first end")
+    b = takes_motion("second end")
+    tension = observable(Force, "damping force, positive in tension")
+
+    def equations(self, v_a: Expr, v_b: Expr) -> Equations:
+        tension = self.coefficient * (v_b - v_a)
+        return {"f_a": -tension, "f_b": tension, "tension": tension}
+
+
+class FrictionBetween(Component):
+    r"""Dry and viscous friction between two moving parts, with the Stribeck curve; creeps instead of sticking.
+
+    .. math:: F = \left[F_c + (F_s - F_c) e^{-(v/v_s)^2}\right] \tanh\frac{v}{v_t} + B v, \quad v = v_a - v_b
+
+    F [N] on part b towards the velocity of a, the reaction on a; F_c = `coulomb_friction`, F_s = `static_friction` [N];
+    v_s = `stribeck_velocity`, v_t = `creep_velocity` [m/s], below which the friction falls to zero with the velocity;
+    B = `viscous_friction` [N s/m]. Not for parts that stand still under load: they creep at up to v_t; exact sticking
+    against the ground is `stick_slip_mass`. Source: B. Armstrong-Helouvry, P. Dupont, C. Canudas de Wit, Automatica 30
+    (1994) 1083-1138, section 2; rounded at rest by a hyperbolic tangent.
+    """
+
+    coulomb_friction: Force = Field(ge=0, description="friction force while sliding")
+    static_friction: Force = Field(ge=0, description="friction force at the start of sliding")
+    stribeck_velocity: Velocity = Field(default=1e-2, gt=0, description="decay of static to Coulomb friction")
+    creep_velocity: Velocity = Field(default=1e-4, gt=0, description="width of the rounding at rest")
+    viscous_friction: Damping = Field(default=0.0, ge=0, description="force per velocity")
+
+    a = takes_motion("first part")
+    b = takes_motion("second part")
+    friction = observable(Force, "friction force on b, towards the velocity of a")
+
+    def equations(self, v_a: Expr, v_b: Expr) -> Equations:
+        slip = v_a - v_b
+        share = slip / self.stribeck_velocity
+        dry = self.coulomb_friction + (self.static_friction - self.coulomb_friction) * exp(-share * share)
+        friction = dry * tanh(slip / self.creep_velocity) + self.viscous_friction * slip
+        return {"f_a": friction, "f_b": -friction, "friction": friction}
+
+
+def contact_force(depth: Any, closing: Any, stiffness: Any, restitution: Any, impact_velocity: Any) -> Any:
+    r"""Force [N] that pushes two touching parts apart; never pulls, and starts from zero.
+
+    .. math:: F = k \delta (1 + a \dot\delta), \quad a = \frac{3}{2} \frac{1 - e}{v_i}
+
+    \delta = `depth` [m], no force below 0; \dot\delta = `closing` [m/s]; k = `stiffness` [N/m]; e = `restitution` [-]
+    at the `impact_velocity` v_i [m/s], to first order in 1 - e.
+    Source: K. H. Hunt, F. R. E. Crossley, J. Appl. Mech. 42 (1975) 440-445, with the exponent 1.
+    """
+    damping = 1.5 * (1 - restitution) / impact_velocity
+    return stiffness * maximum(depth, 0.0) * maximum(1 + damping * closing, 0.0)
+
+
+class ElasticEndStops(Component):
+    r"""Elastic stops in the ground at both ends of a stroke.
+
+    .. math:: F = k \delta (1 + a \dot\delta), \quad a = \frac{3}{2} \frac{1 - e}{v_i}, \quad
+              \delta = x_{low} - x \text{ or } x - x_{high}
+
+    F [N] on the rod's mass, away from the stop, for \delta > 0 and never pulling; k = `stiffness` [N/m]; e =
+    `restitution` [-], rebound over impact speed, at an impact with v_i = `impact_velocity` [m/s] and nearer to 1 in
+    slower ones (e = 1 - 2 a v/3 to first order in a v); stops at `low` and `high` [m]. Not for rigid stops
+    (`mass_with_stops`).
+    Source: K. H. Hunt, F. R. E. Crossley, J. Appl. Mech. 42 (1975) 440-445, with the exponent 1.
+    """
+
+    low: Length = Field(default=0.0, description="position of the low stop")
+    high: Length = Field(description="position of the high stop")
+    stiffness: Stiffness = Field(default=1e8, gt=0, description="force per depth")
+    restitution: Ratio = Field(default=0.5, ge=0, le=1, description="rebound over impact speed")
+    impact_velocity: Velocity = Field(default=0.1, gt=0, description="impact speed at which the restitution holds")
+
+    rod = takes_motion("what the stops hold")
+    force = observable(Force, "force of the stops on the rod's mass")
+
+    @model_validator(mode="after")
+    def _stops_in_order(self) -> Self:
+        if self.low >= self.high:
+            raise ValueError(f"high ({self.high * 1e3:g} mm) must lie above low ({self.low * 1e3:g} mm)")
+        return self
+
+    def equations(self, x_rod: Expr, v_rod: Expr) -> Equations:
+        law = (self.stiffness, self.restitution, self.impact_velocity)
+        force = contact_force(self.low - x_rod, -v_rod, *law) - contact_force(x_rod - self.high, v_rod, *law)
+        return {"f_rod": -force, "force": force}
+
+
+class ElasticContact(Component):
+    r"""Elastic contact of two moving parts once the clearance between them is used up.
+
+    .. math:: F = k \delta (1 + a \dot\delta), \quad a = \frac{3}{2} \frac{1 - e}{v_i}, \quad
+              \delta = x_a + l_c - x_b
+
+    F [N] pushes a towards -x and b towards +x, for \delta > 0 [m] and never pulling; l_c = `clearance` [m], the
+    distance x_b - x_a at which they touch; k = `stiffness` [N/m]; e = `restitution` [-] at v_i = `impact_velocity`
+    [m/s] of approach (see `elastic_end_stops`). Not for parts that are joined: use `spring_between`. Source: K. H.
+    Hunt, F. R. E. Crossley, J. Appl. Mech. 42 (1975) 440-445, with the exponent 1.
+    """
+
+    clearance: Length = Field(default=0.0, description="x_b - x_a where the parts touch")
+    stiffness: Stiffness = Field(default=1e8, gt=0, description="force per depth")
+    restitution: Ratio = Field(default=0.5, ge=0, le=1, description="rebound over impact speed")
+    impact_velocity: Velocity = Field(default=0.1, gt=0, description="impact speed at which the restitution holds")
+
+    a = takes_motion("the part at lower x")
+    b = takes_motion("the part at higher x")
+    force = observable(Force, "force that pushes the parts apart")
+
+    def equations(self, x_a: Expr, x_b: Expr, v_a: Expr, v_b: Expr) -> Equations:
+        depth, closing = x_a + self.clearance - x_b, v_a - v_b
+        force = contact_force(depth, closing, self.stiffness, self.restitution, self.impact_velocity)
+        return {"f_a": force, "f_b": -force, "force": force}
 
 
 class ForceSource(Component):

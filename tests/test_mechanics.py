@@ -6,7 +6,12 @@ import numpy as np
 import pytest
 from crescentlab.components.mechanics import (
     Damper,
+    DamperBetween,
+    ElasticContact,
+    ElasticEndStops,
     ForceSource,
+    FrictionBetween,
+    Mass,
     MassWithStops,
     MotionSource,
     SignalForceSource,
@@ -206,3 +211,56 @@ def test_stick_slip_oscillator():
     for early, breaks in ((1e-6, False), (-1e-6, True)):
         now, _ = equations(t_next - early, slip.y[0, -1], 0.0, 0.0)
         assert now["breaks_away_up"].condition == breaks
+
+
+def test_mass_obeys_newton_everywhere():
+    """2 N on 0.5 kg give 4 m/s^2, and nothing else happens."""
+    got = Mass(mass=0.5).equations(x=-7.0, v=0.3, f_port=2.0)
+    assert got == {"x_port": -7.0, "v_port": 0.3, "der_x": 0.3, "der_v": 4.0}
+
+
+@pytest.mark.parametrize(
+    "part",
+    [
+        DamperBetween(coefficient=50.0),
+        FrictionBetween(coulomb_friction=6.0, static_friction=10.0, viscous_friction=20.0),
+    ],
+    ids=lambda p: p.type_name(),
+)
+def test_dampers_between_parts_only_take_power(part):
+    """f_a = -f_b; the force turns with the slip, depends on nothing else, takes power, and vanishes without slip."""
+    for slip in (1e-5, 1e-3, 0.4):
+        there, back = part.equations(v_a=1.0 + slip, v_b=1.0), part.equations(v_a=1.0 - slip, v_b=1.0)
+        assert there["f_a"] == -there["f_b"] == pytest.approx(-back["f_a"], rel=1e-9)
+        assert there["f_a"] * (1.0 + slip) + there["f_b"] * 1.0 > 0
+    assert part.equations(v_a=1.0, v_b=1.0)["f_a"] == 0
+
+
+def test_friction_creeps_below_its_creep_velocity():
+    """Under 5 N, less than static friction: the slip at which they balance is v_t atanh(0.5) to first order."""
+    part = FrictionBetween(coulomb_friction=10.0, static_friction=10.0, creep_velocity=1e-4)
+    assert part.equations(v_a=1e-4 * math.atanh(0.5), v_b=0.0)["friction"] == pytest.approx(5.0, rel=1e-12)
+
+
+def test_elastic_stops_push_only_inwards():
+    """k times the depth at rest, more while closing, less while opening, never pulling; nothing within the stroke."""
+    stops = ElasticEndStops(high=0.01, stiffness=1e6, restitution=0.5, impact_velocity=0.1)
+    assert stops.equations(x_rod=0.005, v_rod=3.0)["force"] == 0
+    for x, inwards in ((-1e-4, 1.0), (0.0101, -1.0)):
+        still, closing, opening, fast = (
+            stops.equations(x_rod=x, v_rod=-inwards * v)["force"] * inwards for v in (0.0, 0.05, -0.05, -9.0)
+        )
+        assert still == pytest.approx(100.0, rel=1e-9)
+        assert closing == pytest.approx(100.0 * (1 + 7.5 * 0.05), rel=1e-9)
+        assert opening == pytest.approx(100.0 * (1 - 7.5 * 0.05), rel=1e-9)
+        assert fast == 0
+    with pytest.raises(ValidationError, match=r"high \(1 mm\) must lie above low \(2 mm\)"):
+        ElasticEndStops(low=2e-3, high=1e-3)
+
+
+def test_contact_keeps_momentum_and_lets_go():
+    """Both parts feel the same force; apart by the clearance there is none."""
+    contact = ElasticContact(clearance=0.02, stiffness=1e6, restitution=1.0)
+    touching = contact.equations(x_a=0.0, x_b=0.019, v_a=0.0, v_b=0.0)
+    assert touching["f_a"] == -touching["f_b"] == pytest.approx(1000.0)
+    assert contact.equations(x_a=0.0, x_b=0.021, v_a=1.0, v_b=0.0)["force"] == 0

@@ -1,0 +1,186 @@
+"""Masses, springs, dampers, friction and contacts."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from typing import Any
+
+from building import circuit, fired
+from crescentlab.components.mechanics import FrictionBetween
+from scipy.optimize import brentq
+
+from crescentlab.result import Result
+from evidence import Number, evidence
+
+
+def run(parts: Mapping[str, Any], nets: Mapping[str, Any], stop: str, rtol: float = 1e-9) -> Result:
+    """A purely mechanical circuit."""
+    return circuit(components=parts, nets=nets, simulation={"stop": stop}).simulate(rtol=rtol)
+
+
+def rebound(v: float, restitution: float, impact_velocity: float) -> float:
+    """Speed after an impact at v with F = k d (1 + a d').
+
+    m v dv/dd = -k d (1 + a v), separated and integrated in and out: v - ln(1 + a v)/a = -w - ln(1 - a w)/a.
+    """
+    a = 1.5 * (1 - restitution) / impact_velocity
+    return float(brentq(lambda w: v - math.log1p(a * v) / a + w + math.log1p(-a * w) / a, 1e-9 * v, v))
+
+
+@evidence(
+    "mass",
+    "force_source",
+    "signal_force_source",
+    "motion_source",
+    source="Newton's second law: x = F t^2/(2 m), v = F t/m; with F = R t, x = R t^3/(6 m)",
+    tolerance=1e-7,
+    because="relative tolerance of the run, 1e-9, over a few hundred steps",
+)
+def constant_force() -> list[Number]:
+    """3 N on 0.5 kg for 0.2 s; a force that rises by 10 N/s on the same; a belt at 0.1 m/s from 5 mm."""
+    parts = {
+        "block": {"type": "mass", "mass": "0.5 kg"},
+        "push": {"type": "force_source", "force": "3 N"},
+        "other": {"type": "mass", "mass": "0.5 kg"},
+        "rises": {"type": "ramp", "after": "10 N", "duration": "1 s"},
+        "pull": {"type": "signal_force_source"},
+        "belt": {"type": "motion_source", "velocity": "0.1 m/s", "position": "5 mm"},
+        "drag": {"type": "damper", "coefficient": "2 N s/m"},
+    }
+    nets = {
+        "b": ["block.port", "push.rod"], "o": ["other.port", "pull.rod"], "s": ["rises.y", "pull.force"],
+        "w": ["belt.port", "drag.rod"],
+    }  # fmt: skip
+    result = run(parts, nets, "200 ms")
+    return [
+        Number("position, constant force", 0.12, float(result["block.x"][-1]), "mm"),
+        Number("velocity, constant force", 1.2, float(result["block.v"][-1]), "m/s"),
+        Number("position, rising force", 10 * 0.2**3 / 6 / 0.5, float(result["other.x"][-1]), "mm"),
+        Number("position of the belt", 0.025, float(result["w.x"][-1]), "mm"),
+    ]
+
+
+@evidence(
+    "mass_with_stops",
+    source="flights of constant acceleration and Newton's law of impact: after n flights t = v_0/g (1 + 2 sum e^k)",
+    tolerance=1e-7,
+    because="relative tolerance of the run, 1e-9; events are found to 1e-9 of the span",
+)
+def bouncing() -> list[Number]:
+    """Dropped from 1 m with e = 0.6 at 9.81 m/s^2: it rests once e^n v_0 < 0.01 m/s, after the 11th flight up."""
+    parts = {
+        "ball": {"type": "mass_with_stops", "mass": "0.1 kg", "high": "10 m", "restitution": "0.6",
+                 "rest_speed": "10 mm/s", "start": {"x": "1 m"}},
+        "weight": {"type": "force_source", "force": "-0.981 N"},
+    }  # fmt: skip
+    result = run(parts, {"b": ["ball.port", "weight.rod"]}, "3 s")
+    hits = fired(result, "ball.hits_low")
+    v_0 = math.sqrt(2 * 9.81)
+    flights = [v_0 / 9.81 * (1 + 2 * sum(0.6**k for k in range(1, n + 1))) for n in (0, 1, 11)]
+    found = [Number(f"time of hit {n + 1}", flights[k], hits[n], "ms") for k, n in enumerate((0, 1, 11))]
+    return [*found, Number("number of hits", 12, len(hits))]
+
+
+@evidence(
+    "stick_slip_mass",
+    source="m x'' = k (V t - x) - F_c from breaking away: J. J. Thomsen, Vibrations and Stability (2003)",
+    tolerance=1e-6,
+    because="relative tolerance of the run, 1e-9; events are found to 1e-9 of the span",
+)
+def stick_slip() -> list[Number]:
+    """1 kg drawn by 400 N/m at 50 mm/s, friction 10 N at rest and 6 N in motion: times of slipping and of sticking."""
+    parts = {
+        "block": {"type": "stick_slip_mass", "mass": "1 kg", "coulomb_friction": "6 N", "static_friction": "10 N"},
+        "spring": {"type": "spring_between", "stiffness": "400 N/m"},
+        "drive": {"type": "motion_source", "velocity": "50 mm/s"},
+    }
+    result = run(parts, {"b": ["block.port", "spring.a"], "d": ["drive.port", "spring.b"]}, "2 s")
+    breaks, stops = fired(result, "block.breaks_away_up"), fired(result, "block.stops")
+    w, a = 20.0, 4.0 / 400.0
+    return [
+        Number("first break-away, F_s/(k V)", 0.5, breaks[0], "ms"),
+        Number("slip, 2 (pi - atan(a w/V))/w", 2 * (math.pi - math.atan(a * w / 0.05)) / w, stops[0] - breaks[0], "ms"),
+        Number("stick, 2 a/V", 2 * a / 0.05, breaks[1] - stops[0], "ms"),
+    ]
+
+
+@evidence(
+    "spring",
+    "spring_between",
+    "damper",
+    "damper_between",
+    source="damped oscillator: x = e^(-d t) (cos w t + d/w sin w t) x_0, d = B/(2 m), w^2 = k/m - d^2",
+    tolerance=1e-6,
+    because="relative tolerance of the run, 1e-9",
+)
+def oscillators() -> list[Number]:
+    """1 kg on 400 N/m and 4 N s/m against the ground, and two of 2 kg with the same between them, after 0.5 s."""
+    parts = {
+        "block": {"type": "mass", "mass": "1 kg", "start": {"x": "10 mm"}},
+        "spring": {"type": "spring", "stiffness": "400 N/m"},
+        "damper": {"type": "damper", "coefficient": "4 N s/m"},
+        "left": {"type": "mass", "mass": "2 kg", "start": {"x": "-5 mm"}},
+        "right": {"type": "mass", "mass": "2 kg", "start": {"x": "5 mm"}},
+        "between": {"type": "spring_between", "stiffness": "400 N/m"},
+        "damps": {"type": "damper_between", "coefficient": "4 N s/m"},
+    }
+    nets = {
+        "b": ["block.port", "spring.rod", "damper.rod"],
+        "l": ["left.port", "between.a", "damps.a"],
+        "r": ["right.port", "between.b", "damps.b"],
+    }
+    result = run(parts, nets, "500 ms")
+    w = math.sqrt(400 - 4.0)
+    x = math.exp(-1.0) * (math.cos(w / 2) + 2 / w * math.sin(w / 2)) * 10e-3
+    return [
+        Number("block on the ground", x, float(result["block.x"][-1]), "mm"),
+        Number("distance of the pair", x, float((result["right.x"] - result["left.x"])[-1]), "mm"),
+    ]
+
+
+@evidence(
+    "friction_between",
+    source="Stribeck curve of Armstrong-Helouvry, Dupont & Canudas de Wit (1994): F_c + (F_s - F_c) e^-1 at v_s",
+    tolerance=1e-12,
+    because="rounding; the hyperbolic tangent is 1 at a hundred creep velocities",
+)
+def stribeck() -> list[Number]:
+    """F_c 6 N, F_s 10 N, v_s 10 mm/s, 50 N s/m: friction at 0.1 mm/s, 10 mm/s and 1 m/s of slip."""
+    part = FrictionBetween(coulomb_friction=6.0, static_friction=10.0, stribeck_velocity=1e-2, viscous_friction=50.0)
+    expected = {
+        1e-4: (6 + 4 * math.exp(-1e-4)) * math.tanh(1.0) + 5e-3,
+        1e-2: 6 + 4 / math.e + 0.5,
+        1.0: 56.0,
+    }
+    return [
+        Number(f"at {1e3 * v:g} mm/s", f, part.equations(v_a=0.2 + v, v_b=0.2)["friction"], "N")
+        for v, f in expected.items()
+    ]
+
+
+@evidence(
+    "elastic_end_stops",
+    "elastic_contact",
+    source="Hunt & Crossley (1975): energy in and out of the contact, v - ln(1 + a v)/a = -w - ln(1 - a w)/a",
+    tolerance=1e-5,
+    because="relative tolerance of the run, 1e-9, on an impact of 1 ms within 0.2 s",
+)
+def impacts() -> list[Number]:
+    """Speed after an impact, e = 0.7 at 0.1 m/s: 1 kg at 0.1 and 0.02 m/s on a stop; two of 2 kg meeting at 0.1 m/s."""
+    found = []
+    for v in (0.1, 0.02):
+        parts = {
+            "block": {"type": "mass", "mass": "1 kg", "start": {"x": "1 mm", "v": f"{v} m/s"}},
+            "stops": {"type": "elastic_end_stops", "high": "2 mm", "stiffness": "1e7 N/m", "restitution": "0.7"},
+        }
+        result = run(parts, {"b": ["block.port", "stops.rod"]}, f"{0.0015 / v} s", 1e-10)
+        found.append(Number(f"from a stop, at {v:g} m/s", rebound(v, 0.7, 0.1), -float(result["block.v"][-1]), "mm/s"))
+    parts = {
+        "left": {"type": "mass", "mass": "2 kg", "start": {"v": "0.1 m/s"}},
+        "right": {"type": "mass", "mass": "2 kg", "start": {"x": "1 mm"}},
+        "touch": {"type": "elastic_contact", "stiffness": "1e7 N/m", "restitution": "0.7"},
+    }
+    result = run(parts, {"l": ["left.port", "touch.a"], "r": ["right.port", "touch.b"]}, "30 ms", 1e-10)
+    apart = float((result["right.v"] - result["left.v"])[-1])
+    return [*found, Number("of two parts, at 0.1 m/s", rebound(0.1, 0.7, 0.1), apart, "mm/s")]
