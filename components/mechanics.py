@@ -65,6 +65,8 @@ class MassWithStops(Component):
         fast = fabs(rebound) > self.rest_speed
         slow = fabs(v) <= self.rest_speed
         rests = where(slow & (x <= self.low), -1.0, where(slow & (x >= self.high), 1.0, 0.0))
+        # while it is free no force is watched: in even motion it would hover about 0
+        pull = where(at == -1, f_port, where(at == 1, -f_port, -1.0))
         return {
             "x_port": x,
             "v_port": v,
@@ -74,7 +76,7 @@ class MassWithStops(Component):
             "hits_high": when(
                 free & (x > self.high), x=self.high, v=where(fast, rebound, 0.0), at=where(fast, 0.0, 1.0)
             ),
-            "leaves": when((at == -1) & (f_port > 0) | (at == 1) & (f_port < 0), at=0.0),
+            "leaves": when(pull > 0, at=0.0),
             "starts": when(
                 at == -2, x=minimum(maximum(x, self.low), self.high), v=where(fabs(rests) > 0.5, 0.0, v), at=rests
             ),

@@ -2,15 +2,19 @@
 
 from crescentlab.component import Component, Equations
 from crescentlab.domain import (
+    gives_motion,
     gives_pressure,
+    gives_rotation,
     gives_signal,
     reads_motion,
     reads_pressure,
     reads_rotation,
+    takes_motion,
     takes_pressure,
+    takes_rotation,
 )
 from crescentlab.maths import Expr
-from crescentlab.units import Angle, Flow, Length, Pressure, Speed, Velocity
+from crescentlab.units import Angle, Flow, Force, Length, Pressure, Speed, Torque, Velocity
 
 
 class PressureSensor(Component):
@@ -121,3 +125,41 @@ class VelocitySensor(Component):
 
     def equations(self, v_port: Expr) -> Equations:
         return {"y": v_port}
+
+
+class ForceSensor(Component):
+    r"""Force between two moving parts as a signal; put in series between a mass and what acts on it.
+
+    .. math:: x_b = x_a, \quad v_b = v_a, \quad y = f_a = -f_b
+
+    x [m]; v [m/s]; f [N] on the sensor, so y is the force with which what is at a pushes what is at b towards
+    increasing x. Port a belongs to the side whose motion is given (a mass, a drive), port b to a net without a giver of
+    its own. It has neither mass nor compliance. Not for a place between two masses: they need a spring between them,
+    whose tension is the force. Source: ideal sensor; Newton's third law.
+    """
+
+    a = takes_motion("side of the mass")
+    b = gives_motion("side of what acts on it")
+    y = gives_signal(Force, "force from a on b")
+
+    def equations(self, x_a: Expr, v_a: Expr, f_b: Expr) -> Equations:
+        return {"x_b": x_a, "v_b": v_a, "f_a": -f_b, "y": -f_b}
+
+
+class TorqueSensor(Component):
+    r"""Torque in a shaft as a signal; put in series between a drive or inertia and what loads it.
+
+    .. math:: \varphi_b = \varphi_a, \quad \omega_b = \omega_a, \quad y = T_a = -T_b
+
+    \varphi [rad]; \omega [rad/s]; T [N m] on the sensor, so y is the torque with which what is at a drives what is at
+    b. Port a belongs to the side whose rotation is given (a drive, an inertia), port b to a net without a giver of its
+    own. It has neither inertia nor compliance. Not for a place between two inertias: they need a shaft between them.
+    Source: ideal sensor; Newton's third law.
+    """
+
+    a = takes_rotation("side of the drive")
+    b = gives_rotation("side of the load")
+    y = gives_signal(Torque, "torque from a on b")
+
+    def equations(self, phi_a: Expr, omega_a: Expr, torque_b: Expr) -> Equations:
+        return {"phi_b": phi_a, "omega_b": omega_a, "torque_a": -torque_b, "y": -torque_b}

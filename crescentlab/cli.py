@@ -30,6 +30,7 @@ COMMANDS = {
     "circuits": "shipped circuits; with --copy one of them and its parts",
     "graph": "draw the schematic",
     "schema": "JSON schema of circuit files, for editors",
+    "new": "write the file of a component of your own",
     "results": "what a result holds; series as CSV on stdout",
     "steady": "find the operating point, where nothing changes any more",
     "periodic": "find the periodic steady state of a circuit with a known period",

@@ -61,6 +61,7 @@ SETTINGS: dict[str, dict[str, object]] = {
     "transfer_function": {"numerator": [2.0, 1.0], "denominator": [3.0, 2.0, 1.0]},
     **{key: {"integral_time": 0.3, "derivative_time": 0.1, "low": -1.0, "high": 0.5} for key in ("pid", "sampled_pid")},
     "crank": {"rod_length": 3e-3},
+    "external_gears": {"module": 1e-3, "dedendum": 1.25e-3},
     "pulse": {"period": 1.0, "width": 0.5},
     "axial_face_gap": {"inner_diameter": 10e-3, "outer_diameter": 20e-3},
     "ball_poppet": {"ball_diameter": 2e-3},

@@ -4,6 +4,7 @@ import math
 
 import numpy as np
 import pytest
+from building import circuit
 from crescentlab.components.mechanics import (
     Damper,
     DamperBetween,
@@ -264,3 +265,20 @@ def test_contact_keeps_momentum_and_lets_go():
     touching = contact.equations(x_a=0.0, x_b=0.019, v_a=0.0, v_b=0.0)
     assert touching["f_a"] == -touching["f_b"] == pytest.approx(1000.0)
     assert contact.equations(x_a=0.0, x_b=0.021, v_a=1.0, v_b=0.0)["force"] == 0
+
+
+@pytest.mark.parametrize("solver", ["lsoda", "bdf", "rodas"])
+def test_a_mass_in_even_motion_between_its_stops_is_left_alone(solver):
+    """At v = F/b the sum of forces is rounding about 0: no relation may watch it. x = v t - v m/b (1 - e^{-bt/m})."""
+    mass = {"type": "mass_with_stops", "mass": "2 kg", "low": "-1 m", "high": "1 m", "start": {"x": "0 m"}}
+    pushed = circuit(
+        components={
+            "mass": mass, "push": {"type": "force_source", "force": "50 N"},
+            "damper": {"type": "damper", "damping": "400 N s/m"},
+        },
+        nets={"rod": ["mass.port", "push.rod", "damper.rod"]},
+    )  # fmt: skip
+    run = pushed.simulate("1 s", solver=solver, rtol=1e-8)
+    v, lag = 50 / 400, 2 / 400
+    assert run["mass.x"][-1] == pytest.approx(v * 1.0 - v * lag, rel=1e-6)
+    assert run.trajectory.statistics.events == 1  # its start

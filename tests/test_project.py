@@ -22,7 +22,7 @@ LAYERS: tuple[tuple[str, ...], ...] = (
     ("tables", "fluid", "domain", "component"),
     ("expressions", "yaml_text", "explain", "library", "netlist"),
     ("elaborate",),
-    ("graph", "trace"),
+    ("graph", "trace", "contract"),
     ("causality",),
     ("system",),
     ("assembly",),
@@ -43,7 +43,7 @@ A room is a module or a package directly under `crescentlab/`; `__init__` is the
 NEVER = {"result": {"system", "trace", "solvers"}}
 """Imports refused although the layers would allow them, types aside: a result is given its evaluator."""
 
-FOR_COMPONENTS = {"component", "domain", "errors", "fluid", "maths", "tables", "units"}
+FOR_COMPONENTS = {"component", "domain", "errors", "expressions", "fluid", "maths", "tables", "units"}
 """Modules of the kernel that component files may import from."""
 
 FOR_PARAMETERS = {"numpy", "pydantic", "pydantic_core"}

@@ -127,6 +127,30 @@ def test_windows_are_run_until_an_outcome_has_settled(here: type[Here], capsys: 
     assert "after 3 windows line.p still changed by" in rows[0]["reason"]
 
 
+def test_two_windows_alike_on_both_sides_of_an_extremum_are_not_settled(
+    here: type[Here], capsys: pytest.CaptureFixture[str]
+) -> None:
+    """A sine of 12.5 Hz in windows of 10 ms: the second and third lie mirrored about its maximum at 20 ms."""
+    circuit = """\
+crescentlab: 1
+parameters: {offset: 2 bar}
+components: {wave: {type: sine, mean: = offset, amplitude: 1 bar, frequency: 12.5 Hz}}
+simulation: {rtol: 1e-8}
+"""
+    study = """\
+crescentlab_study: 1
+circuit: wave.yaml
+vary: {list: {offset: [2 bar]}}
+run: {until: {settled: wave.y, within: 0.1 %, every: 10 ms, at_most: 6}}
+measure: {mean: mean(wave.y)}
+"""
+    Path("wave.yaml").write_text(circuit, encoding="utf-8")
+    Path("s.yaml").write_text(study, encoding="utf-8")
+    (row,) = told(capsys, "study", "s.yaml")["table"]
+    assert row["status"] == "unsettled"
+    assert row["final_time"] == pytest.approx(0.06)
+
+
 def test_steady_and_periodic_points_are_measured(here: type[Here], capsys: pytest.CaptureFixture[str]) -> None:
     """At rest what flows in flows out; a sine of amplitude 1 L/min into an ideal line has that line and its mean."""
     circuit = f"""\

@@ -173,7 +173,7 @@ class _Course:
             else:
                 low, at_low = middle, at_middle
         root = high
-        if high - low > self.tolerance:
+        if high - low > self.tolerance and self.value(high) < 0:  # rounding may have put it on its side again
             root = float(brentq(self.value, low, high, xtol=self.tolerance, rtol=4 * EPS))
         nudge = self.tolerance
         if self.turned(root, heading=root - start <= 2 * nudge):

@@ -166,7 +166,8 @@ def _until(circuit: Circuit, job: Job, design: Design, until: UntilSection) -> _
     """Windows of equal length, one after another, until an outcome changes no more; the last one is measured."""
     every, watched = seconds(until.every, design), settling(until)
     start: Snapshot | None = None
-    last, steps, said = math.nan, 0, ""
+    last = before_last = math.inf
+    steps, said = 0, ""
     for number in range(1, until.at_most + 1):
         result = circuit.simulate(
             number * every, job.settings, start=start, max_step=job.run.max_step, check=False, **_options(job.run)
@@ -177,12 +178,12 @@ def _until(circuit: Circuit, job: Job, design: Design, until: UntilSection) -> _
             return _Ran(result, None, FAILED, reason, steps)
         window = Window(result)
         value = watched.value(window)
-        change, limit = abs(float(value.value) - last), within(until, value)
-        if change <= limit:
+        now, limit = float(value.value), within(until, value)
+        if max(abs(now - last), abs(now - before_last)) <= limit:  # two alike may stand on both sides of an extremum
             return _Ran(result, window, steps=steps)
-        shown = value.quantity.show(change, next(iter(value.quantity.units)))
+        shown = value.quantity.show(abs(now - last), next(iter(value.quantity.units)))
         said = f"{until.settled} still changed by {shown}, more than {until.within}"
-        start, last = result.trajectory.end, float(value.value)
+        start, last, before_last = result.trajectory.end, now, last
     return _Ran(result, window, UNSETTLED, f"after {until.at_most} windows {said}", steps)
 
 

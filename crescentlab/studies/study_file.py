@@ -82,7 +82,7 @@ class UntilSection(_Section):
     settled: str = Field(description="a variable, whose mean is meant, or an outcome")
     within: str = Field(default="0.1 %", description="largest change from window to window: a share, or with a unit")
     every: TimeText = Field(description="length of a window")
-    at_most: int = Field(default=100, ge=2, description="most windows")
+    at_most: int = Field(default=100, ge=3, description="most windows")
 
 
 class RunSection(_Section):

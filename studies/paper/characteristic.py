@@ -192,8 +192,8 @@ def tell(page: Page, data: Data) -> None:
         {settings} at each speed, from 400 mm² to closed.""",
     )
     page.say("""The measured dots of Fig. 19 are not printed as numbers, so what is compared is what the text says
-        of the figure. Each setting is run until the mean pressure changes by less than 0.1 % from one revolution
-        to the next, and averaged over the last one. The paper itself doubts its last measured points, at 4000 rpm
+        of the figure. Each setting is brought to its periodic steady state (`analysis: periodic`) and averaged over
+        a pitch. The paper itself doubts its last measured points, at 4000 rpm
         with the throttle nearly closed, for the oil was hotter there.""")
     page.table(
         ["at 4000 rpm, throttle closed", "bar", "share"],

@@ -14,7 +14,7 @@ from crescentlab.report.page import Page
 from crescentlab.report.pictures import new_figure
 from studies.paper.effort import Effort
 from studies.paper.gear_picture import gears_in_mesh
-from studies.paper.runs import CC, DEG, MM, RTOL, SOLVER, at_pressure, pump
+from studies.paper.runs import CC, DEG, MM, RTOL, SOLVER, area_for, pump, revolution
 
 DISPLACEMENT = 13.65 * CC / (2 * math.pi)
 PITCH = 2 * math.pi / 13
@@ -41,7 +41,7 @@ class Data:
 
 def compute(effort: Effort) -> Data:
     """Everything from the running circuit."""
-    run = at_pressure(2000, 5.0, tolerance=5e-3)
+    run = revolution(2000, area_for(2000, 5.0, tolerance=5e-3))
     rates = {name: run.last(f"gears.{name}") for name in ("dVd", "dVs", "dVt")}
     events = [h.time for h in run.result.trajectory.happenings if "gears.meshes" in h.names]
     angles = np.interp(events, run.result.time, run.result["shaft.phi"])

@@ -16,10 +16,6 @@ from crescentlab.result import Result
 
 BAR, LPM, MM, DEG, CC = 1e5, 1e-3 / 60, 1e-3, math.pi / 180, 1e-6
 SOLVER, RTOL = "rodas", 1e-4
-SETTLED = 1e-3
-"""Settled: the mean delivery pressure changes by less than this share from one revolution to the next."""
-REVOLUTIONS = (6, 12, 24, 48, 96)
-"""Lengths that are tried until a run has settled."""
 GRID = 13 * 64
 """Rows per revolution for spectra: a multiple of 13."""
 
@@ -32,7 +28,7 @@ def pump() -> cl.Circuit:
 
 @dataclass(frozen=True)
 class Run:
-    """The last revolution of a settled run."""
+    """A pitch or more of a settled run."""
 
     result: Result
     start: float
@@ -40,24 +36,24 @@ class Run:
 
     @functools.cached_property
     def window(self) -> Window:
-        """The revolution on the nodes of the solver's own dense output."""
+        """The window on the nodes of the solver's own dense output."""
         return Window(self.result, self.start, self.stop)
 
     def mean(self, name: str) -> float:
-        """Mean over the revolution, in SI."""
+        """Mean over it, in SI."""
         return self.number(f"mean({name})")
 
     def number(self, text: str) -> float:
-        """An outcome of the revolution, in SI: ``peak_to_peak(delivery.p)``."""
+        """An outcome of it, in SI: ``peak_to_peak(delivery.p)``."""
         return Outcome(text, text).value(self.window).value
 
     def last(self, name: str) -> np.ndarray:
-        """Values in the revolution at the rows of the run: the solver's own times, or its grid."""
+        """Values in it at the rows of the run: the solver's own times, or its grid."""
         return self.result[name][self._rows]
 
     @property
     def times(self) -> np.ndarray:
-        """Times of :meth:`last`, from the revolution's beginning [s]."""
+        """Times of :meth:`last`, from its beginning [s]."""
         return self.result.time[self._rows] - self.start
 
     @property
@@ -66,15 +62,13 @@ class Run:
         return (self.result.time >= self.start - slack) & (self.result.time <= self.stop + slack)
 
 
-def settled(rpm: float, area: float, given: Mapping[str, str] | None = None, loosest: float = SETTLED) -> Run:
-    """The pump at ``rpm`` with a throttle of ``area`` [m^2], run on until its mean pressure has settled."""
-    turn, parameters, result = 60 / rpm, settings(rpm, area, given), None
-    for turns in REVOLUTIONS:
-        result = simulate(turns * turn, parameters, start=result)
-        run, before = (Run(result, k * turn, (k + 1) * turn) for k in (turns - 1, turns - 2))
-        if abs(run.mean("delivery.p") / before.mean("delivery.p") - 1) < loosest:
-            return run
-    raise RuntimeError(f"the mean pressure has not settled after {turns} revolutions with {parameters}")
+def settled(rpm: float, area: float, given: Mapping[str, str] | None = None) -> Run:
+    """The pump at ``rpm`` with a throttle of ``area`` [m^2] in its periodic steady state: one pitch of it."""
+    parameters = settings(rpm, area, given)
+    found = cl.periodic(pump(), parameters, solver=SOLVER, rtol=RTOL, compile=True)
+    if not found.converged:
+        raise RuntimeError(f"{found.message}, with {parameters}")
+    return Run(found.result, float(found.result.time[0]), float(found.result.time[-1]))
 
 
 def settings(rpm: float, area: float, given: Mapping[str, str] | None = None) -> dict[str, str]:
@@ -88,11 +82,18 @@ def simulate(stop: float, parameters: Mapping[str, str], **more: Any) -> Result:
 
 
 def on_a_grid(rpm: float, area: float, turns: int, given: Mapping[str, str] | None = None) -> Run:
-    """``turns`` revolutions after settling ten times better than :data:`SETTLED`, :data:`GRID` rows each."""
-    before, turn = settled(rpm, area, given, loosest=SETTLED / 10), 60 / rpm
+    """``turns`` revolutions of the periodic steady state, :data:`GRID` rows each."""
+    before, turn = settled(rpm, area, given), 60 / rpm
     stop = before.stop + turns * turn
     result = simulate(stop, settings(rpm, area, given), start=before.result, output_step=turn / GRID)
     return Run(result, before.stop, stop)
+
+
+def revolution(rpm: float, area: float, given: Mapping[str, str] | None = None) -> Run:
+    """A revolution of the periodic steady state, at the solver's own times."""
+    before = settled(rpm, area, given)
+    stop = before.stop + 60 / rpm
+    return Run(simulate(stop, settings(rpm, area, given), start=before.result), before.stop, stop)
 
 
 def at_pressure(rpm: float, bar: float, given: Mapping[str, str] | None = None, tolerance: float = 1e-3) -> Run:

@@ -8,7 +8,7 @@ from building import OIL, circuit
 from crescentlab.components.pistons import PistonChamber
 
 from crescentlab.analysis.linear import linearize
-from crescentlab.analysis.modes import modes
+from crescentlab.analysis.linear.modes import modes
 from evidence import Number, evidence
 
 MM = 1e-3

@@ -1,0 +1,336 @@
+"""What must hold for every component class, as checks: of the library's classes, and of a user's own.
+
+.. code-block:: python
+
+    from crescentlab.contract import check_component
+
+    def test_contract():
+        check_component(MyOrifice(area=5e-6), SimpleOil(...))
+
+A check raises :class:`AssertionError` that says which class breaks what. Where numbers are needed they are random
+admissible ones, of the size that their quantities usually have, and the same in every run.
+"""
+
+from __future__ import annotations
+
+import inspect
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import Any, Literal, TypeAlias, get_args
+
+import casadi as ca
+import numpy as np
+
+from crescentlab import units
+from crescentlab.component import Component, field_quantity
+from crescentlab.domain import HYDRAULIC, SIGNAL, Held, Observable, Port, State
+from crescentlab.fluid import Fluid
+from crescentlab.trace import Layout, Trace, fluids_asked, numeric_fields, trace
+
+Backwards: TypeAlias = Literal["equal", "unequal", "nothing"]
+"""What a restriction passes backwards: as much as forwards, another flow, or nothing."""
+
+Values: TypeAlias = dict[str, np.ndarray]
+"""States, held values and port inputs by name, one element per element of their size."""
+
+NOW = 0.3
+"""Time [s] of every point."""
+
+
+def check_component(
+    component: Component | type[Component],
+    *fluids: Fluid,
+    backwards: Backwards = "equal",
+    within: Mapping[str, tuple[float, float]] | None = None,
+) -> None:
+    """Run every check of this module; raises :class:`AssertionError` naming the class and what it breaks.
+
+    ``component`` is an instance with sensible numbers, or a class, whose required parameters then get the usual size
+    of their quantity. Equations that ask for a fluid are checked with each of ``fluids``. ``backwards`` says what a
+    restriction between two nets passes backwards. ``within`` narrows what is drawn: the range in SI of a state, held
+    value or port input by its name in ``equations``, where the equations do not hold for any value of the usual size.
+    """
+    cls = component if isinstance(component, type) else type(component)
+    for one in [sample(form) for form in cls.forms()] if isinstance(component, type) else [component]:
+        check_documented(type(one))
+        if fluids_asked(type(one)) and not fluids:
+            raise TypeError(f"{cls.__name__} asks for a fluid; write check_component({cls.__name__}, SimpleOil(...))")
+        for fluid in fluids or (None,):
+            case = Case(one, fluid, within or {})
+            check_floats_equal_symbols(case)
+            check_jacobian(case)
+            if case.stored:
+                check_content(case)
+            if case.restricts:
+                check_restriction(case, backwards)
+
+
+def sample(cls: type[Component], settings: Mapping[str, Any] | None = None) -> Component:
+    """An instance with every required parameter at its quantity's usual size, but for those of ``settings``."""
+    values = dict(settings or {})
+    for name, declared in cls.model_fields.items():
+        if declared.is_required() and name not in values:
+            quantity = field_quantity(declared)
+            values[name] = quantity.nominal if quantity else 1.0
+    return cls(**values)
+
+
+@dataclass(frozen=True)
+class Case:
+    """One component with one fluid, traced; and the points at which it is looked at."""
+
+    component: Component
+    fluid: Fluid | None
+    within: Mapping[str, tuple[float, float]] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        known = [name for layout in (self.made.states, self.made.held, self.made.inputs) for name, _ in layout.slots]
+        unknown = set(self.within) - set(known)
+        if unknown:
+            raise TypeError(f"{self.name}: within names {min(unknown)}; its equations know {', '.join(known)}")
+
+    @property
+    def cls(self) -> type[Component]:
+        """The component's class."""
+        return type(self.component)
+
+    @property
+    def name(self) -> str:
+        """The class's name, for messages."""
+        return self.cls.__name__
+
+    @cached_property
+    def made(self) -> Trace:
+        """The equations on symbols."""
+        asked = fluids_asked(self.cls)
+        return trace(self.component, dict.fromkeys(asked, self.fluid) if self.fluid is not None else {})
+
+    @property
+    def stored(self) -> list[str]:
+        """Names of the observables that say how much fluid the component stores."""
+        return [o.name for o in self.cls.declared(Observable) if o.stored]
+
+    @property
+    def restricts(self) -> bool:
+        """Whether it is a restriction between two nets: two pressures taken, no state, nothing that moves."""
+        hydraulic = [p for p in self.cls.ports() if p.domain is HYDRAULIC]
+        moves = any(p.domain.name in ("translational", "rotational") for p in self.cls.ports())
+        takers = [p.role for p in hydraulic] == ["takes", "takes"]
+        return takers and not moves and not self.cls.declared(State)
+
+    @cached_property
+    def quantities(self) -> dict[str, units.Quantity]:
+        """Quantities of states, held values and port inputs by name."""
+        declared = [(d.name, d.quantity) for kind in (State, Held) for d in self.cls.declared(kind)]
+        inputs = [pair for port in self.cls.ports() for pair in port.inputs()]
+        return {name: self.component.quantity(quantity) for name, quantity in [*declared, *inputs]}
+
+    # -- points ------------------------------------------------------------------------------------
+
+    def point(self, seed: int) -> Values:
+        """Random admissible states, held values and inputs."""
+        random = np.random.default_rng(seed)
+        found = {
+            name: self._drawn(name, n, random)
+            for layout in (self.made.states, self.made.inputs)
+            for name, n in layout.slots
+        }
+        for name, n in self.made.held.slots:
+            mode = self.quantities[name] is units.ratio and name not in self.within
+            whole = random.integers(-1, 2, 1 if n is None else n).astype(float) if mode else None
+            found[name] = self._drawn(name, n, random) if whole is None else whole
+        return found
+
+    def _drawn(self, name: str, n: int | None, random: np.random.Generator) -> np.ndarray:
+        quantity, size = self.quantities[name], 1 if n is None else n
+        if name in self.within:
+            return random.uniform(*self.within[name], size)
+        if quantity is units.time:  # of a line's last tick, shortly before now
+            return np.array([NOW - random.uniform(0.0, 5e-5)])
+        usual = 4e5 if quantity is units.pressure else quantity.nominal
+        low = 0.2 if name.startswith("V_") else -0.2 if quantity is units.pressure else -1.0
+        return usual * random.uniform(low, 1.0, size)
+
+    def at_rest(self, values: Values) -> Values:
+        """The point with everything at zero, or as near as ``within`` allows; volumes as they are."""
+        return {
+            name: value if name.startswith("V_") else np.clip(np.zeros_like(value), *self.within.get(name, (0.0, 0.0)))
+            for name, value in values.items()
+        }
+
+    # -- values at a point -------------------------------------------------------------------------
+
+    def arguments(self, values: Values, bits: np.ndarray) -> list[np.ndarray]:
+        """Arguments of the trace's functions."""
+        made, fluid = self.made, self.fluid
+        p = np.array([getattr(self.component, n) for n in made.parameters])
+        pf = [getattr(fluid, n) for _ in made.fluids for n in numeric_fields(type(fluid), fluid)]  # type: ignore[arg-type]
+        states, held, inputs = (flat(layout, values) for layout in (made.states, made.held, made.inputs))
+        return [np.array(NOW), states, held, bits, inputs, p, np.array(pf)]
+
+    def given(self, values: Values) -> list[np.ndarray]:
+        """Arguments whose bits say the truth at the point, as plain floats would decide."""
+        bits = np.zeros(len(self.made.relations))
+        strict = np.array([r.strict for r in self.made.relations], dtype=bool)
+        for _ in range(len(bits) + 1):
+            g = np.array(self.made.relation(*self.arguments(values, bits)))
+            bits = ((g[:, 0] > 0) | ((g[:, 0] == 0) & ~strict)).astype(float) if len(bits) else bits
+        return self.arguments(values, bits)
+
+    def numbers(self, values: Values) -> dict[str, Any]:
+        """What equations return on floats at the point."""
+        known: dict[str, Any] = {"t": NOW, **dict.fromkeys(self.made.fluids, self.fluid)}
+        for layout in (self.made.states, self.made.held, self.made.inputs):
+            known |= {name: float(values[name][0]) if n is None else values[name] for name, n in layout.slots}
+        with np.errstate(all="ignore"):
+            return self.component.equations(**{n: known[n] for n in self.cls.asks_for()})
+
+    def symbols(self) -> list[ca.SX]:
+        """Symbols for the arguments of the trace's functions."""
+        function = self.made.derivative
+        return [ca.SX.sym(f"a{k}", function.size1_in(k)) for k in range(function.n_in())]
+
+
+def flat(layout: Layout, values: Values) -> np.ndarray:
+    """The vector of a layout."""
+    parts = [values[name] for name, _ in layout.slots]
+    return np.concatenate(parts) if parts else np.zeros(0)
+
+
+def _require(kept: bool, message: str) -> None:
+    if not kept:
+        raise AssertionError(message)
+
+
+# -- checks --------------------------------------------------------------------------------------------
+
+
+def check_documented(cls: type[Component]) -> None:
+    """Docstring with equation, units and source; a meaning for every parameter, port, state and observable."""
+    text = inspect.getdoc(cls) or ""
+    family = next((inspect.getdoc(b) or "" for b in cls.__mro__ if getattr(b, "family", False)), "")
+    for part, meaning in ((".. math::", "equation"), ("[", "SI unit in brackets"), ("Source:", "source")):
+        said = text + family if part == ".. math::" else text
+        _require(part in said, f"{cls.__name__}: its docstring has no {meaning}: {part!r} is missing")
+    slip = next((c for c in "\a\b\f\r\v" if c in text), "")
+    _require(not slip, f"{cls.__name__}: its docstring holds {slip!r}; begin it with r, so that a backslash stays one")
+    declared = [*cls.ports(), *(d for kind in (State, Held, Observable) for d in cls.declared(kind))]
+    described = {n: f.description for n, f in cls.model_fields.items()} | {d.name: d.description for d in declared}
+    for name, description in described.items():
+        _require(bool(description), f"{cls.__name__}: {name} has no description")
+
+
+def check_floats_equal_symbols(case: Case) -> None:
+    """The traced equations give what the same text gives on plain floats, at random admissible points."""
+    made = case.made
+    for seed in range(5):
+        values = case.point(seed)
+        given, expected = case.given(values), case.numbers(values)
+        for layout, function, prefix in (
+            (made.states, made.derivative, "der_"),
+            (made.observables, made.observable, ""),
+        ):
+            got = np.array(function(*given)).ravel()
+            for name, _ in layout.slots:
+                _same(case, prefix + name, got[list(layout.indices(name))], expected[prefix + name])
+        for group in made.groups:
+            computed = dict(zip(group.outputs, np.array(group.function(*given)).ravel(), strict=True))
+            for name, n in made.outputs.slots:
+                places = [k for k in made.outputs.indices(name) if k in computed]
+                first = made.outputs.offsets[name][0]
+                size = 1 if n is None else n
+                whole = np.broadcast_to(np.atleast_1d(np.asarray(expected[name], dtype=float)), (size,))
+                _same(case, name, np.array([computed[k] for k in places]), whole[[k - first for k in places]])
+
+
+def _same(case: Case, name: str, symbols: np.ndarray, floats: Any) -> None:
+    wanted = np.atleast_1d(np.asarray(floats, dtype=float))
+    finite = bool(np.isfinite(wanted).all())
+    _require(finite, f"{case.name}: {name} is {wanted} on floats; narrow it by within=")
+    kept = np.allclose(symbols, wanted, rtol=1e-9, atol=1e-300)
+    _require(kept, f"{case.name}: {name} is {symbols} on symbols and {wanted} on floats; use crescentlab.maths")
+
+
+def check_jacobian(case: Case) -> None:
+    """No derivative is infinite or not a number: at random points, and with everything at zero, at zero drop."""
+    made, symbols = case.made, case.symbols()
+    rows = [f"der_{name}" for name in named(made.states)]
+    rows += [outputs for group in made.groups for outputs in (named(made.outputs)[k] for k in group.outputs)]
+    columns = named(made.states) + named(made.inputs)
+    values_of = ca.vertcat(made.derivative(*symbols), *[g.function(*symbols) for g in made.groups])
+    jacobian = ca.Function("j", symbols, [ca.jacobian(values_of, ca.vertcat(symbols[1], symbols[4]))])
+    for seed in range(4):
+        values = case.point(seed) if seed < 3 else case.at_rest(case.point(seed))
+        found = np.array(jacobian(*case.given(values)))
+        for i, j in np.argwhere(~np.isfinite(found)):
+            told = ", ".join(f"{name} = {np.squeeze(value)}" for name, value in values.items())
+            raise AssertionError(f"{case.name}: d {rows[i]} / d {columns[j]} is {found[i, j]} at {told}")
+
+
+def named(layout: Layout) -> list[str]:
+    """One name per element of a layout's vector."""
+    return [name if n is None else f"{name}[{k + 1}]" for name, n in layout.slots for k in range(1 if n is None else n)]
+
+
+def check_content(case: Case) -> None:
+    """d(content)/dt along the equations equals the sum of the hydraulic flows: what enters is stored.
+
+    The rate of a chamber's volume enters with its own dV, a position with its velocity; parts whose content changes by
+    held values only (a line between ticks) keep it through their states. Signals without a unit, which may switch
+    something, are 0 or 1.
+    """
+    made, symbols = case.made, case.symbols()
+    content = made.observable(*symbols)[list(made.observables.indices(case.stored[0]))]
+    rate = ca.jtimes(content, symbols[1], made.derivative(*symbols))
+    for name, _ in made.inputs.slots:
+        if name.startswith(("V_", "x_")):
+            rates = f"d{name}" if name.startswith("V_") else f"v{name[1:]}"
+            here, there = list(made.inputs.indices(name)), list(made.inputs.indices(rates))
+            rate += ca.mtimes(ca.jacobian(content, symbols[4][here]), symbols[4][there])
+    function = ca.Function("rate", symbols, [rate])
+    switches = [p.name for p in case.cls.ports() if p.domain is SIGNAL and case.quantities.get(p.name) is units.ratio]
+    for seed in range(5):
+        values = case.point(seed)
+        values |= {name: np.full_like(values[name], float(seed % 2)) for name in set(switches) - set(case.within)}
+        found, expected = float(function(*case.given(values))), case.numbers(values)
+        flows = [
+            float(np.sum(values[f"q_{p.name}"] if p.role == "gives" else expected[f"q_{p.name}"]))
+            for p in case.cls.ports() if p.domain is HYDRAULIC and p.role != "reads"
+        ]  # fmt: skip
+        kept = abs(found - sum(flows)) <= 1e-9 * (sum(abs(f) for f in flows) + 1e-12)
+        _require(kept, f"{case.name}: {case.stored[0]} grows by {found:g} m^3/s, but {sum(flows):g} m^3/s flow in")
+
+
+def check_restriction(case: Case, backwards: Backwards = "equal") -> None:
+    """A restriction keeps nothing: q_a + q_b = 0; with its pressures exchanged it passes what ``backwards`` says."""
+    if backwards not in get_args(Backwards):
+        raise TypeError(f"backwards={backwards!r}: write one of {', '.join(map(repr, get_args(Backwards)))}")
+    a, b = (p for p in case.cls.ports() if p.domain is HYDRAULIC)
+    for seed in range(3):
+        values = case.point(seed)
+        there, out = _flows(case, values, (a, b))
+        values[f"p_{a.name}"], values[f"p_{b.name}"] = values[f"p_{b.name}"], values[f"p_{a.name}"]
+        back, _ = _flows(case, values, (a, b))
+        told = f"{case.name}: q_{a.name} is {there} m^3/s"
+        _require(_near(there, -out, 1e-12), f"{told}, q_{b.name} {out}; their sum must be 0")
+        told = f"{told}, with the pressures exchanged {back}"
+        if backwards == "nothing":
+            kept = bool(np.all(np.minimum(there, back) == 0))
+            _require(kept, f"{told}; nothing may pass backwards, forwards it is positive")
+        elif backwards == "unequal":
+            kept = bool(np.all(there * back < 0) and np.all(abs(there + back) > 1e-3 * abs(back)))
+            _require(kept, f"{told}; the signs must differ, and the sizes by more than 0.1 %")
+        else:
+            advice = "if that is meant, check with backwards='unequal' or 'nothing'"
+            _require(_near(back, -there, 1e-9), f"{told}; it must be the opposite; {advice}")
+
+
+def _flows(case: Case, values: Values, ports: Sequence[Port]) -> list[np.ndarray]:
+    returned = case.numbers(values)
+    return [np.atleast_1d(np.asarray(returned[f"q_{p.name}"], dtype=float)) for p in ports]
+
+
+def _near(found: np.ndarray, wanted: np.ndarray, share: float) -> bool:
+    """Equal to a share of the size wanted, or to 1e-12 m^3/s, below anything that counts as flow."""
+    return bool(np.all(abs(found - wanted) <= np.maximum(share * abs(wanted), 1e-12)))
