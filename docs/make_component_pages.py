@@ -35,8 +35,7 @@ def family(cls: type[Component] | type[Fluid]) -> str:
 
 def pages() -> dict[str, str]:
     """Every page by its file's name."""
-    library = installed()
-    known = {**library.components, **library.fluids}
+    known = described.listed(installed())
     families: dict[str, dict[str, type[Component] | type[Fluid]]] = {}
     for name in sorted(known):
         families.setdefault(family(known[name]), {})[name] = known[name]

@@ -2,9 +2,16 @@
 
 from __future__ import annotations
 
+import importlib.util
+from pathlib import Path
+
 import pytest
 from evidence import Case, cases
 
+from crescentlab.commands.components import listed
+from crescentlab.library import installed
+
+ROOT = Path(__file__).resolve().parents[1]
 CASES = cases()
 
 
@@ -18,3 +25,22 @@ def test_figures_agree_with_their_source(case: Case) -> None:
     assert numbers
     for number in numbers:
         assert number.error <= case.tolerance, f"{number.what}: {number.computed} instead of {number.expected}"
+
+
+def test_every_type_has_evidence() -> None:
+    """Fluids too; a family stands for its causal forms."""
+    shown = {name for case in CASES for name in case.types}
+    known = set(listed(installed()))
+    assert not known - shown, f"no figure for {sorted(known - shown)}"
+    assert not shown - known, f"figures for what the library does not have: {sorted(shown - known)}"
+
+
+def test_the_pages_of_the_components_are_those_of_this_code() -> None:
+    """Written by `python docs/make_component_pages.py`."""
+    spec = importlib.util.spec_from_file_location("pages", ROOT / "docs" / "make_component_pages.py")
+    assert spec is not None
+    assert spec.loader is not None
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    kept = {path.name: path.read_text(encoding="utf-8") for path in (ROOT / "docs" / "components").glob("*.md")}
+    assert module.pages() == kept

@@ -274,7 +274,7 @@ def test_a_mass_in_even_motion_between_its_stops_is_left_alone(solver):
     pushed = circuit(
         components={
             "mass": mass, "push": {"type": "force_source", "force": "50 N"},
-            "damper": {"type": "damper", "damping": "400 N s/m"},
+            "damper": {"type": "damper", "coefficient": "400 N s/m"},
         },
         nets={"rod": ["mass.port", "push.rod", "damper.rod"]},
     )  # fmt: skip
