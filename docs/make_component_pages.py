@@ -81,9 +81,9 @@ def text(cls: type) -> str:
     body = re.sub(r"(?m)^\.\. math:: (.*(?:\n[ ]+\S.*)*)", lambda m: f"$$\n{_joined(m[1])}\n$$", body)
     body = re.sub(r":\w+:`[~.]*([\w.]+)`", r"`\1`", body)
     outside = re.split(r"(\$\$.*?\$\$)", body, flags=re.DOTALL)
-    symbol = (
-        r"(?<![\w$\\])((?:[A-Za-z]_)?\\[A-Za-z]+(?:\{[^{}]*\})?(?:[_^](?:\{[^{}]*\}|\w))*(?: ?\\?[A-Za-z](?![\w]))?)"
-    )
+    index = r"(?:[_^](?:\{[^{}]*\}|\w))*"
+    command, letter = rf"\\[A-Za-z]+(?:\{{[^{{}}]*\}})*{index}", rf"[A-Za-z](?![A-Za-z']){index}"
+    symbol = rf"(?<![\w$\\])((?:[A-Za-z]_)?{command}(?: ?(?:{command}|{letter}))*)"
     return "".join(p if p.startswith("$$") else re.sub(symbol, r"$\1$", p) for p in outside)
 
 
