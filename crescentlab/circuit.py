@@ -172,7 +172,7 @@ class Circuit:
             output_step=_time(output_step, "output_step", section.output_step),
             compile=section.compile if compile is None else compile,
         )  # fmt: skip
-        _check(options)
+        check_options(options)
         values = system.values(design)
         begin = None if start is None else snapshot_of(start, system)
         if begin is not None and not options.stop > begin.t:
@@ -223,7 +223,7 @@ def stand_in_fluids(design: Design, library: Library) -> dict[str, Fluid]:
     return {}
 
 
-def _check(options: Options) -> None:
+def check_options(options: Options) -> None:
     """Refuse what argparse or a caller cannot know to be wrong."""
     if not SMALLEST_RTOL <= options.rtol < 1:
         raise InputError(

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -155,6 +156,31 @@ def test_a_circuit_without_a_period_asks_for_it() -> None:
         periodic(cl.load("relief_valve"))
 
 
+@pytest.mark.parametrize(
+    ("wrong", "said"),
+    [
+        ({"tolerance": 0.0}, "tolerance 0: write a number"),
+        ({"tolerance": float("nan")}, "tolerance nan: write a number"),
+        ({"tolerance": 2.0}, "tolerance 2: write a number"),
+        ({"rtol": 5.0}, "rtol 5"),
+        ({"most": 0}, "most 0: write 5 periods or more"),
+        ({"solver": "rodos"}, "did you mean rodas"),
+        ({"period": "0 ms"}, "period: 0 ms must be above 0"),
+    ],
+)
+def test_what_cannot_be_searched_for_is_refused(wrong: dict[str, Any], said: str) -> None:
+    """Before any period is integrated."""
+    lag = alone(Lag, lag="5 ms", frequency="50 Hz", size="2 bar")
+    with pytest.raises(InputError, match=said):
+        periodic(lag, **{"period": "20 ms", **wrong})
+
+
+def test_no_more_periods_than_allowed_are_integrated() -> None:
+    """Those that look for a doubled period included."""
+    lag = alone(Lag, lag="5 ms", frequency="50 Hz", size="2 bar")
+    assert periodic(lag, period="10 ms", most=40).periods == 40
+
+
 def test_anderson_solves_a_linear_map_in_as_many_steps_as_it_has_modes() -> None:
     """As GMRES does: Walker & Ni (2011), theorem 2.2. Four modes: done at the sixth evaluation."""
     rng = np.random.default_rng(3)
@@ -179,5 +205,5 @@ def test_the_command_prints_and_writes_the_last_period(
     assert said["distance"] <= said["tolerance"] == 1e-3
     arguments = ["--start", "crescent_pump_periodic.nc", "--stop", "60 ms", "--quiet", "--rtol", "1e-4"]
     assert main(["simulate", "crescent_pump", *arguments]) == 0
-    assert main(["periodic", "crescent_pump", "--rtol", "1e-4", "--most", "4", "-o", "none"]) == 3
-    assert "not periodic after 4 periods" in capsys.readouterr().err
+    assert main(["periodic", "crescent_pump", "--rtol", "1e-4", "--most", "5", "-o", "none"]) == 3
+    assert "not periodic after 5 periods" in capsys.readouterr().err

@@ -72,7 +72,8 @@ def report(found: Periodic, target: Path | None) -> dict[str, Any]:
         "residual": found.residual, "distance": found.distance, "tolerance": found.tolerance,
         "multiplier": found.multiplier, "plain_periods": found.plain, "plain_periods_estimated": found.plain_estimate,
         "slowest": found.slowest, "means": {n: found.result.mean(n) for n in _shown(found)},
-        "file": str(target) if target else None, "error": found.message or None,
+        "warnings": list(found.result.trajectory.warnings), "file": str(target) if target else None,
+        "error": found.message or None,
     }  # fmt: skip
 
 

@@ -17,9 +17,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from crescentlab.analysis.periodic.anderson import Anderson
-from crescentlab.circuit import Circuit, Start, snapshot_of
+from crescentlab.circuit import Circuit, Start, check_options, snapshot_of
 from crescentlab.elaborate import Design
 from crescentlab.errors import InputError, SimulationError
+from crescentlab.netlist import SMALLEST_RTOL
 from crescentlab.result import Result
 from crescentlab.solvers.integrate import integrate
 from crescentlab.solvers.limits import PressureLimits
@@ -34,6 +35,8 @@ MEMORY = 8
 """Earlier periods that the acceleration looks at."""
 PLAIN = 2
 """Periods at the beginning that only forget the fast part of the start."""
+FEWEST = 5
+"""Least number of periods that the search may be limited to."""
 TRIAL = 8
 """Plain periods after which it is looked whether two of them repeat themselves."""
 WORSE = 3.0
@@ -108,8 +111,14 @@ def periodic(
         stop=seconds, rtol=rtol, solver=solver, compile=section.compile if compile is None else compile,
         max_step=section.max_step,
     )  # fmt: skip
+    check_options(options)
+    tolerance = 10 * rtol if tolerance is None else tolerance
+    if not SMALLEST_RTOL <= tolerance < 1:
+        raise InputError(f"tolerance {tolerance:g}: write a number from 1e-13 to below 1, for example 1e-4")
+    if most < FEWEST:
+        raise InputError(f"most {most}: write {FEWEST} periods or more, for example 300")
     begin = None if start is None else snapshot_of(start, system)
-    search = _Search(system, values, options, seconds, 10 * rtol if tolerance is None else tolerance, begin)
+    search = _Search(system, values, options, seconds, tolerance, begin)
     found = search.run(most, accelerate, progress)
     result = Result(system, found.start.values(values), design, found.trajectory)
     done = Periodic(
@@ -205,6 +214,7 @@ class _Search:
         here, best, first = run.end, math.inf, math.nan
         safe = here
         fixed: Array | None = None  # differences must be comparable from period to period
+        trial = TRIAL if most >= 3 * TRIAL else 0
         while True:
             try:
                 run = self.one_period(here)
@@ -231,8 +241,8 @@ class _Search:
             found = _Found(here, run, residual, distance, distance <= self.tolerance and self.periods > PLAIN + 1)
             if found.converged:
                 return found
-            if self.periods >= most:
-                found.message = self.explained(found, most)
+            if self.periods >= most - trial:
+                found.message = self.explained(found, trial)
                 return found
             if progress is not None and first > 0:
                 progress(min(1.0, math.log(max(residual, self.tolerance) / first) / math.log(self.tolerance / first)))
@@ -260,16 +270,17 @@ class _Search:
         names = self.names()
         return [names[k] for k in np.argsort(-moved)[:3]]
 
-    def explained(self, found: _Found, most: int) -> str:
-        """Why it did not close, and what to try."""
-        last = [found.trajectory.end]
-        for _ in range(TRIAL):
+    def explained(self, found: _Found, trial: int) -> str:
+        """Why it did not close, and what to try; ``trial`` more periods show whether two of them repeat themselves."""
+        last = [found.start, found.trajectory.end]
+        for _ in range(trial):
             last.append(self.one_period(last[-1]).end)
         z = [self.z(at) for at in last[-3:] if at is not None]
-        after_one, after_two = (float(np.max(np.abs(z[-1] - z[k]) / self.scale)) for k in (-2, -3))
-        said = f"not periodic after {most} periods of {self.period:.6g} s: {', '.join(self.worst(found))} change most"
+        after_one, after_two = (float(np.max(np.abs(z[-1] - z[k]) / self.scale)) for k in (-2, -len(z)))
+        most = ", ".join(self.worst(found))
+        said = f"not periodic after {self.periods} periods of {self.period:.6g} s: {most} change most"
         said += f", by {found.residual:.2g} of their size a period where {self.tolerance:.2g} is allowed"
-        if after_two < after_one / 10:
+        if trial and after_two < after_one / 10:
             return f"{said}; two periods repeat themselves to {after_two:.2g}: write twice the period"
         return f"{said}; allow more periods, a larger tolerance, or check the period"
 
