@@ -533,9 +533,52 @@ def test_the_end_of_a_result_is_an_operating_point(
     np.testing.assert_allclose(there["A"], linearize(cl.load("relief_valve")).A, rtol=1e-3)
 
 
+def test_the_start_values_and_no_file(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """`--at '0 s'` linearises the start values as they are, with a warning; `-o none` writes nothing."""
+    monkeypatch.chdir(tmp_path)
+    assert main(["linearize", "relief_valve", "--at", "0 s", "-o", "none", "--json"]) == 0
+    found = json.loads(capsys.readouterr().out)
+    assert found["operating_point"]["time"] == 0
+    assert found["operating_point"]["found_by"] == "the start values, at 0 s"
+    assert any("this is no point of rest" in warning for warning in found["warnings"])
+    assert list(tmp_path.iterdir()) == []
+    valve = cl.load("relief_valve")
+    begun = valve.simulate("1 ns").trajectory.end  # so soon that nothing has moved yet
+    np.testing.assert_allclose(found["A"], linearize(valve, at=begun).A, rtol=1e-3, atol=1e-3)
+
+
+def test_a_circuit_that_a_sine_drives_is_told_what_to_write(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """The advice works: a steady point with the time standing still, then `--start` with its file."""
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "driven.yaml").write_text(
+        "crescentlab: 1\ntitle: Driven\n"
+        "fluid: {type: simple_oil, density: 870 kg/m^3, kinematic_viscosity: 46 cSt, bulk_modulus: 1.6 GPa}\n"
+        "components:\n"
+        "  wave: {type: sine, mean: 20 L/min, amplitude: 5 L/min, frequency: 100 Hz}\n"
+        "  pump: {type: signal_flow_source}\n"
+        "  line: {type: capacity, volume: 70 cm^3}\n"
+        "  hole: {type: orifice, area: 5 mm^2}\n"
+        "  tank: {type: tank}\n"
+        "nets: {asked: [wave.y, pump.flow], p: [pump.port, line.port, hole.a], t: [hole.b, tank.port]}\n",
+        encoding="utf-8",
+    )
+    assert main(["linearize", "driven.yaml"]) == 2
+    said = capsys.readouterr().err
+    assert "let the time stand still with crescentlab steady --at T and linearise the file" in said
+    assert main(["steady", "driven.yaml", "--at", "2.5 ms", "-o", "point.nc", "--quiet"]) == 0
+    assert main(["linearize", "driven.yaml", "--start", "point.nc", "--json"]) == 0
+    assert json.loads(capsys.readouterr().out)["operating_point"]["time"] == 2.5e-3
+
+
 @pytest.mark.parametrize(
     ("options", "said"),
     [
+        (["--at", "-1 ms"], "--at -1 ms is before the start, 0 s"),
+        (["--at", "5"], "--at 5: a time is a number with its unit; write for example 20 ms"),
         (["--input", "supply"], "--input without --output"),
         (["--output", "line.p"], "--output without --input"),
         (["--exact-lines"], "--exact-lines without a response"),

@@ -114,6 +114,35 @@ def test_a_parameter_of_the_outcome_alone():
     assert_exact(found, [[-found.values[0] / 4], [0.0]], rtol=1e-9, atol=1e-12)
 
 
+@pytest.mark.parametrize("method", ["auto", "exact", "differences"])
+def test_a_frequency_that_the_parameter_moves_is_refused(method):
+    """A window of fixed length holds whole periods of one frequency only: beside it the line mixes with the mean.
+
+    Of another parameter the same outcome has its derivative: the line of p0 e^(-A t/V) is proportional to p0.
+    """
+    run = circuit(
+        Tank,
+        components={"part": {"type": Tank.type_name(), "volume": "2", "conductance": "3", "start": {"p": "= full"}}},
+        parameters={"beat": "4 Hz", "twice": "= 2 * beat", "full": "5"}, simulation={"stop": "1 s"},
+    )  # fmt: skip
+    for frequency in ("beat", "twice"):
+        with pytest.raises(InputError, match=r"beat moves the frequency .* the frequency must not depend on the param"):
+            of(run, ["mean(part.p)", f"amplitude(part.p, {frequency})"], ["full", "beat"], method=method)
+    found = of(run, ["amplitude(part.p, twice)", "amplitude(part.p, 4 Hz)"], ["full"], method=method)
+    np.testing.assert_allclose(found.derivative[:, 0], found.values / 5, rtol=1e-6)
+
+
+def test_a_frequency_that_the_run_moves_is_refused():
+    """f = 4 Hz initial(p)/5 follows the start value, and not the volume."""
+    parts = {"type": Tank.type_name(), "volume": "2", "conductance": "3", "start": {"p": "= full"}}
+    run = circuit(Tank, components={"part": parts}, parameters={"full": "5"}, simulation={"stop": "1 s"})
+    with pytest.raises(InputError, match="full moves the frequency of this amplitude"):
+        of(run, ["amplitude(part.p, 4 Hz * initial(part.p) / 5)"], ["full"])
+    found = of(run, ["amplitude(part.p, 4 Hz * initial(part.p) / 5)"], ["part.volume"], method="exact")
+    fixed = of(run, ["amplitude(part.p, 4 Hz)"], ["part.volume"], method="exact")
+    np.testing.assert_allclose(found.derivative, fixed.derivative, rtol=1e-6)
+
+
 def test_a_part_of_the_run():
     """The window's ends stay where they are: the mean over [t1, t2] of p0 exp(-A t/V) by V."""
     run = alone(Tank, volume="2", conductance="3", start={"p": "5"})

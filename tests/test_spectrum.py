@@ -211,7 +211,17 @@ def test_rows_of_a_file_give_the_same_lines() -> None:
         assert np.abs(found.lines - exact).max() < ROUNDING * 5e4
         assert found.error < ROUNDING * 5e4
         assert found.quantity.name == "pressure"
+        assert (found.start, found.stop) == pytest.approx(((3 - periods) * PERIOD, 3 * PERIOD), rel=1e-12)
         assert found.change == pytest.approx(0, abs=1e-9)
+
+
+def test_rows_without_their_last_end_begin_with_the_file() -> None:
+    """Three periods whose end is not among the rows: the window is the whole file, 0 to 30 ms."""
+    whole = rows()
+    part = Series(whole.source, whole.t[:-1], {"p": whole.values["p"][:-1]}, whole.units)
+    (found,) = spectra_of_rows(part, ["p"], PERIOD, periods=3)
+    assert (found.start, found.stop) == pytest.approx((0, 3 * PERIOD), abs=1e-12)
+    assert abs(found.lines[2] + 5e4j) < ROUNDING * 5e4
 
 
 def test_rows_too_coarse_say_that_they_alias() -> None:
@@ -321,6 +331,8 @@ def test_the_command_prints_lines_in_display_units(bench: Path, capsys: pytest.C
     assert titles[:3] == ["frequency [Hz]", "order", "wave.y [m^3/s]"]
     assert float(mean[2]) == pytest.approx(20e-3 / 60)
     assert [float(v) for v in first[:3]] == pytest.approx([100, 4, 1e-3 / 60])
+    assert titles[3] == "wave.y phase [deg]"
+    assert float(first[3]) == pytest.approx(-90)  # a sine is a cosine a quarter of a turn late
     assert len(more) == 49
 
 
@@ -373,6 +385,9 @@ def test_a_result_file_serves_where_its_grid_fits(bench: Path, capsys: pytest.Ca
         (["wave.y", "--periods", "7"], "does not hold 7 x 10 ms; simulate longer, for example --stop '80 ms'"),
         (["wave.y", "--periods", "0"], "at least one period"),
         (["wave.y", "--from", "55 ms"], "there are 0 periods of 10 ms; simulate longer (--stop), or begin earlier"),
+        (["wave.y", "--from", "500 ms"], "--from 500 ms: the run ends at 60 ms already; simulate longer"),
+        (["wave.y", "--highest", "0"], "--highest 0: a frequency has a number and a unit; write for example 5 kHz"),
+        (["wave.y", "--highest", "0 Hz"], "--highest 0 Hz must be above 0; write for example 5 kHz"),
         (["wave.y", "--highest", "50 Hz"], "there is no line up to 50 Hz; the first is at 100 Hz"),
         (["wave.y", "--orders", "turnin"], "no shaft speed of this name: did you mean turning"),
         (["wave.y", "--orders", "0 rpm"], "the shaft stands still"),

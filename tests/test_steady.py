@@ -21,6 +21,7 @@ from crescentlab.analysis.steady import steady
 from crescentlab.analysis.steady.newton import DENSE
 from crescentlab.circuit import Circuit
 from crescentlab.cli import main
+from crescentlab.commands.steady import summary
 from crescentlab.component import Component
 from crescentlab.domain import held, state
 from crescentlab.errors import InputError, SimulationError
@@ -456,7 +457,9 @@ RAMP = {"before": "20 L/min", "after": "5 L/min", "at": "10 ms", "duration": "10
 
 def test_a_source_in_time_is_told_even_at_its_crest():
     """At 90 deg the sine's own rate is 0; let stand still there, the flow is 25 L/min and a warning says so."""
-    with pytest.raises(InputError, match=r"the time itself \(through signal\) changes the rate of line\.p; write --at"):
+    with pytest.raises(
+        InputError, match=r"the time itself \(through signal\) changes the rate of line\.p; let the time"
+    ):
         steady(signal("sine", **SINE))
     point = steady(signal("sine", **SINE), at="0 s")
     assert point.result["hole.q"][0] == pytest.approx(25 * LPM, rel=1e-9)
@@ -469,6 +472,34 @@ def test_a_ramp_is_at_rest_before_and_after(at, flow, warns):
     point = steady(signal("ramp", **RAMP), at=at)
     assert point.result["hole.q"][0] == pytest.approx(flow * LPM, rel=1e-9)
     assert len(point.warnings) == warns
+
+
+def bench(**values: str) -> Circuit:
+    """Nothing stores fluid: a pressure that a signal asks for, through a hole."""
+    parts = {"signal": {"output_quantity": "pressure", **values}, "source": {"type": "signal_pressure_source"},
+             "hole": HOLE, "tank": TANK}  # fmt: skip
+    nets = {"asked": ["signal.y", "source.pressure"], "p": ["source.port", "hole.a"], "t": ["hole.b", "tank.port"]}
+    return of(parts, nets, outputs={"through": "= hole.q"})
+
+
+RISE = {"type": "ramp", "before": "0 bar", "after": "10 bar", "at": "0 s", "duration": "1 s"}
+SWING = {"type": "sine", "mean": "5 bar", "amplitude": "1 bar", "frequency": "50 Hz"}
+
+
+@pytest.mark.parametrize(
+    ("source", "at", "p", "warns"),
+    [
+        (RISE, None, 0, True), (RISE, "0.5 s", 5, True), (RISE, "1.5 s", 10, False),
+        (SWING, None, 5, True), (SWING, "5 ms", 6, True),
+        ({"type": "constant", "value": "3 bar"}, None, 3, False),
+    ],
+)  # fmt: skip
+def test_without_states_a_signal_under_way_is_told(source, at, p, warns):
+    """10 bar/s: 5 bar after half a second; 5 bar + 1 bar sin(100 pi t), whose own rate is 0 at its crest, 5 ms."""
+    point = steady(bench(**source), at=at)
+    assert point.result["p.p"][0] == pytest.approx(p * 1e5, abs=1e-6)
+    assert len(point.warnings) == warns
+    assert all("(through signal) changes signal.y" in warning for warning in point.warnings)
 
 
 def test_the_time_is_that_of_the_start():
@@ -581,6 +612,14 @@ def test_the_summary_and_the_file(tmp_path, capsys, monkeypatch):
     assert (code, json.loads(out)["method"]) == (0, "newton")
 
 
+def test_the_summary_shows_outputs():
+    """As `simulate` does, flows too, by the name that the circuit gives them: Cd A sqrt(2 dp/rho) at 3 bar."""
+    lines = summary(steady(bench(type="constant", value="3 bar")), None).splitlines()
+    rows = {line.split()[0]: line.split()[1:] for line in lines if line.split()}
+    assert rows["through"][0] == "L/min"
+    assert float(rows["through"][1]) == pytest.approx(hole_flow(3e5, 0) / LPM, rel=1e-4)
+
+
 def test_json_holds_values_in_si(tmp_path, capsys, monkeypatch):
     """On success and on failure, without NaN."""
     monkeypatch.chdir(tmp_path)
@@ -602,9 +641,11 @@ def test_wrong_input_is_one_sentence(tmp_path, capsys, monkeypatch):
     monkeypatch.chdir(tmp_path)
     for arguments in (
         ("crescent_pump",), ("relief_valve", "--tolerance", "2"), ("relief_valve", "--at", "5 bar"),
-        ("relief_valve", "--start", "missing.nc"), ("relief_valve", "-o", "point.txt"), ("relief_valv",),
+        ("relief_valve", "--at=-1"), ("relief_valve", "--start", "missing.nc"), ("relief_valve", "-o", "point.txt"),
+        ("relief_valv",),
     ):  # fmt: skip
         code, out, err = run(capsys, *arguments)
         assert (code, out) == (2, ""), arguments
         assert err.count("\n") == 1, err
+        assert "-1 ms" not in err
     assert list(tmp_path.iterdir()) == []

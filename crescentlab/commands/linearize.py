@@ -14,12 +14,13 @@ from crescentlab.analysis.linear.files import UNITS, check_linear_target, docume
 from crescentlab.analysis.linear.frequency import POINTS, Responses, Transfer, band, frequency_response
 from crescentlab.analysis.linear.modes import Mode
 from crescentlab.analysis.linear.plots import shown_gain, write_frequency_plots
+from crescentlab.analysis.steady.rest import Site
 from crescentlab.circuit import Circuit, load, snapshot_of
 from crescentlab.cli import DONE
 from crescentlab.commands import arguments as shared
 from crescentlab.commands.text import counted, settings, table
 from crescentlab.elaborate import Design
-from crescentlab.errors import InputError
+from crescentlab.errors import InputError, UnitError
 from crescentlab.solvers.snapshot import Snapshot
 from crescentlab.units import QUANTITIES
 
@@ -34,7 +35,7 @@ def arguments(parser: argparse.ArgumentParser) -> None:
     """Declare what the command takes."""
     shared.circuit(parser)
     parser.add_argument(
-        "--at", metavar="T", help="simulate to this time and linearise there; default: the point of rest"
+        "--at", metavar="T", help="simulate to this time and linearise there, '0 s': at the start; default: at rest"
     )
     parser.add_argument("--start", metavar="FILE", help="linearise at the end of this result; with --at go on from it")
     parser.add_argument(
@@ -52,7 +53,9 @@ def arguments(parser: argparse.ArgumentParser) -> None:
         "--unit", default="Hz", choices=list(UNITS), help="of frequencies in tables, files and pictures"
     )
     parser.add_argument("--exact-lines", action="store_true", help="overlay: lines by their exact two-ports")
-    parser.add_argument("-o", metavar="FILE", dest="file", help=".csv (and its companions) or .json")
+    parser.add_argument(
+        "-o", metavar="FILE", dest="file", help=".csv (and its companions) or .json; none writes nothing"
+    )
     parser.add_argument("--plot", action="store_true", help="write Bode diagram, impedance and poles as PNG files")
     shared.json(parser)
     shared.quiet(parser)
@@ -61,6 +64,8 @@ def arguments(parser: argparse.ArgumentParser) -> None:
 def run(options: argparse.Namespace) -> int:
     """Run the command."""
     low, high = band(options.frequencies)
+    if options.file == "none":
+        options.file = None
     if options.file is not None:
         check_linear_target(Path(options.file))
     if bool(options.input) != bool(options.output):
@@ -95,16 +100,46 @@ def run(options: argparse.Namespace) -> int:
 def operating_point(circuit: Circuit, values: dict[str, str], options: argparse.Namespace) -> tuple[Snapshot, str]:
     """Where to linearise, and how that was found."""
     if options.at is not None:
-        result = circuit.simulate(options.at, values, start=options.start)
-        if result.trajectory.end is None:
-            raise InputError(f"--at {options.at}: the run has no end to linearise at")
-        return result.trajectory.end, f"simulated to {QUANTITIES['time'].show(result.trajectory.end.t, 'ms')}"
+        return simulated_to(circuit, values, options.at, options.start)
     if options.start is not None:
         return snapshot_of(options.start, circuit.system(values)), f"the end of {options.start}"
-    from crescentlab.analysis.steady import steady
+    from crescentlab.analysis.steady import MovingError, steady
 
-    found = steady(circuit, values)
+    try:
+        found = steady(circuit, values)
+    except MovingError as error:
+        still = "let the time stand still with crescentlab steady --at T"
+        advice = f"{still} and linearise the file that it writes (--start FILE), or linearise a run at a time (--at T)"
+        raise MovingError(error.why, advice) from None
     return found.snapshot, f"steady, by {found.method}"
+
+
+def simulated_to(circuit: Circuit, values: dict[str, str], at: str, start: str | None) -> tuple[Snapshot, str]:
+    """Where a run stands at a time, which at its begin is its start."""
+    try:
+        t = QUANTITIES["time"].parse(at)
+    except UnitError:
+        raise InputError(f"--at {at}: a time is a number with its unit; write for example 20 ms") from None
+    begin = started(circuit, values, start)
+    if t < begin.t:
+        raise InputError(f"--at {at} is before the start, {begin.t:g} s; write this time or a later one")
+    if t == begin.t:
+        return begin, "the start values, at 0 s" if start is None else f"the end of {start}"
+    result = circuit.simulate(t, values, start=start)
+    if result.trajectory.end is None:
+        raise InputError(f"--at {at}: the run has no end to linearise at")
+    return result.trajectory.end, f"simulated to {QUANTITIES['time'].show(result.trajectory.end.t, 'ms')}"
+
+
+def started(circuit: Circuit, values: dict[str, str], start: str | None) -> Snapshot:
+    """The end of a result, or the circuit's start values with what fires there."""
+    design = circuit.design(values)
+    system = circuit.assembled(design)
+    if start is not None:
+        return snapshot_of(start, system)
+    numbers = system.values(design)
+    site = Site(system, numbers, numbers.start_time, design.netlist.sections.simulation.stop)
+    return site.snapshot(site.begun(None))
 
 
 # -- what is printed -----------------------------------------------------------------------------

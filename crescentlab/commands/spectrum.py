@@ -114,12 +114,23 @@ def _parsed(option: str, quantity: Quantity, text: str) -> float:
         raise InputError(f"{option}: {error.message}") from None
 
 
+def _highest(text: str) -> float:
+    """The highest frequency [Hz]."""
+    try:
+        hertz = frequency.parse(text)
+    except UnitError:
+        raise InputError(f"--highest {text}: a frequency has a number and a unit; write for example 5 kHz") from None
+    if not hertz > 0:
+        raise InputError(f"--highest {text} must be above 0; write for example 5 kHz")
+    return hertz
+
+
 def _taken(options: argparse.Namespace) -> dict[str, Any]:
     """Which periods and lines are asked for."""
     return {
         "periods": options.periods,
         "start": _parsed("--from", time, options.begin) if options.begin else None,
-        "highest": _parsed("--highest", frequency, options.highest) if options.highest else None,
+        "highest": _highest(options.highest) if options.highest else None,
     }
 
 

@@ -1,4 +1,4 @@
-"""What ``crescentlab spectrum`` says: tables in display units, JSON and CSV in SI."""
+"""What ``crescentlab spectrum`` says: tables in display units, JSON and CSV in SI, but phases of the CSV in deg."""
 
 from __future__ import annotations
 
@@ -100,15 +100,15 @@ def _table_of(each: Spectrum, shaft: float | None, shown: Shown, lines: int) -> 
 
 
 def spectrum_rows(found: Sequence[Spectrum], shaft: float | None) -> Iterable[Sequence[Any]]:
-    """Rows of the CSV file, SI: frequency, order, and of each variable amplitude and phase."""
+    """Rows of the CSV file: frequency, order, and of each variable amplitude (SI) and phase [deg]."""
     orders = ["order"] if shaft is not None else []
-    pairs = [(f"{s.name} [{s.quantity.si}]", f"{s.name} phase [rad]") for s in found]
+    pairs = [(f"{s.name} [{s.quantity.si}]", f"{s.name} phase [deg]") for s in found]
     yield ["frequency [Hz]", *orders, *(title for pair in pairs for title in pair)]
     yield [0.0, *[0.0 for _ in orders], *(v for s in found for v in (s.mean, 0.0))]
     for k in range(min(s.frequency.size for s in found)):
         lines = [s.line(k, shaft) for s in found]
         order = [lines[0].order] if shaft is not None else []
-        yield [lines[0].frequency, *order, *(v for line in lines for v in (line.amplitude, line.phase))]
+        yield [lines[0].frequency, *order, *(v for line in lines for v in (line.amplitude, math.degrees(line.phase)))]
 
 
 # -- waterfalls ----------------------------------------------------------------------------------

@@ -1,4 +1,4 @@
-"""Linear models and frequency responses as JSON and CSV, all numbers in SI."""
+"""Linear models and frequency responses as JSON and CSV, all numbers in SI, but phases in deg."""
 
 from __future__ import annotations
 

@@ -22,6 +22,7 @@ from crescentlab.analysis.sensitivity.extremes import refined
 from crescentlab.analysis.sensitivity.moved import Moving
 from crescentlab.analysis.sensitivity.parameter_map import Parameter, Reach, Reaching, find
 from crescentlab.analysis.sensitivity.replay import NotDifferentiableError
+from crescentlab.analysis.sensitivity.tones import STAYS, check_tones, refusal, tones
 from crescentlab.analysis.sensitivity.variational import trajectory_sensitivity
 from crescentlab.circuit import Circuit, Start, snapshot_of
 from crescentlab.errors import InputError, nearest
@@ -82,7 +83,8 @@ def sensitivities(
     then given and do not depend on the parameters. ``method``: ``exact`` raises where ``auto`` falls back to
     ``differences``. With ``check``, exact derivatives are compared with one difference along all parameters at once
     (two runs; one by one where they depend on each other); where these do not agree ``auto`` takes differences. Raises
-    :class:`InputError` for names, words and whole numbers, :class:`SimulationError` where a run fails.
+    :class:`InputError` for names, words, whole numbers, and an amplitude whose frequency depends on a parameter,
+    :class:`SimulationError` where a run fails.
     """
     _check(outcomes, parameters, method)
     given = dict(settings or {})
@@ -96,6 +98,8 @@ def sensitivities(
     runs = Runs(circuit, outcomes, given, options, window)
     work = _Work(runs, found, reaching, tight)
     result = runs.simulate()
+    shown = Window(result, *window)
+    check_tones(shown, outcomes, found, reaching)
     if method == "differences":
         reasons: list[str | None] = ["asked for"] * len(found)
     else:
@@ -106,7 +110,6 @@ def sensitivities(
             k = next(k for k, reason in enumerate(reasons) if reason)
             raise InputError(f"{found[k].name}: no exact derivative, {reasons[k]}; --method differences takes others")
     work.differences([k for k, reason in enumerate(reasons) if reason], reasons)
-    shown = Window(result, *window)
     values = np.array([float(outcome.value(shown).value) for outcome in outcomes])
     return Sensitivities(
         tuple(outcomes), found, quantities, values, work.derivative, work.error, tuple(work.method),
@@ -184,6 +187,13 @@ class _Work:
         )
         window = refined(result, Window(result, *self.runs.window), self.runs.outcomes)
         moving = Moving(result, window, found)
+        for outcome in self.runs.outcomes:
+            outcome.value(window)  # now it knows what variables they need
+        for outcome in self.runs.outcomes:
+            present = tones(window, outcome, window.design) if "amplitude" in outcome.text else []
+            for j, (k, reach) in enumerate(reaches.items() if present else ()):
+                if moving.periods(outcome, reach, j, self.parameters[k].size) > STAYS:
+                    raise refusal(outcome, self.parameters[k], window, present[0])
         return {
             k: moving.derivatives(self.runs.outcomes, reach, j, self.parameters[k].size)
             for j, (k, reach) in enumerate(reaches.items())

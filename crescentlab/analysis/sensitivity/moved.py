@@ -8,7 +8,7 @@ an expression of these; it is differenced along that direction, a millionth up a
 from __future__ import annotations
 
 import copy
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -16,6 +16,7 @@ import numpy as np
 from crescentlab.analysis.outcome import Outcome, Window
 from crescentlab.analysis.sensitivity.parameter_map import Reach, shifted
 from crescentlab.analysis.sensitivity.replay import NotDifferentiableError
+from crescentlab.analysis.sensitivity.tones import tones
 from crescentlab.analysis.sensitivity.variational import Sensitivity
 from crescentlab.result import Result
 
@@ -137,6 +138,27 @@ class Moving:
         edge: Edge | None,
     ) -> list[float]:  # fmt: skip
         """The derivatives; with ``edge`` its event has come into the window, and what is beyond it with it."""
+        new, step = self.line(reach, j, size, times, moves, edge)
+
+        def at(amount: float) -> Array:
+            return np.array([float(outcome.value(new(amount)).value) for outcome in outcomes])
+
+        found = (at(step) - at(-step)) / (2 * step)
+        if not np.isfinite(found).all():
+            name = outcomes[int(np.flatnonzero(~np.isfinite(found))[0])].name
+            raise NotDifferentiableError(f"the derivative of {name} is not finite")
+        return [float(v) for v in found]
+
+    def periods(self, outcome: Outcome, reach: Reach, j: int, size: float) -> float:
+        """Largest relative change of the periods of an outcome's amplitudes in the window, per change of size."""
+        new, step = self.line(reach, j, size, *self.knots(j), None)
+        up, down = (np.array(tones(w, outcome, w.design)) * w.length for w in (new(step), new(-step)))
+        return float(np.max(np.abs(up - down) / np.abs(up + down), initial=0.0)) / step * size
+
+    def line(
+        self, reach: Reach, j: int, size: float, times: Array, moves: Array, edge: Edge | None
+    ) -> tuple[Callable[[float], Window], float]:
+        """The window as parameter j moves by an amount, and the step for differences."""
         w = self.window
         if edge is not None:
             moves = moves.copy()
@@ -152,20 +174,16 @@ class Moving:
         ends = (0.0, float(self.of.shifts[-1, j]) if self.ends else 0.0)
         step = TINY / max(self.extent(dx, dh, dt, reach), 1 / size)
 
-        def at(amount: float) -> Array:
+        def moved(amount: float) -> Window:
             new = copy.copy(w)
             new.t, new.weights = w.t + amount * dt, w.weights + amount * weights
             new.x, new.h, new.p = w.x + amount * dx, w.h + amount * dh, w.p + amount * reach.p
             new.start, new.stop = w.start + amount * ends[0], w.stop + amount * ends[1]
             new.design = shifted(w.design, reach.circuit, amount)
             new.series = together(new, list(self.window.series))
-            return np.array([float(outcome.value(new).value) for outcome in outcomes])
+            return new
 
-        found = (at(step) - at(-step)) / (2 * step)
-        if not np.isfinite(found).all():
-            name = outcomes[int(np.flatnonzero(~np.isfinite(found))[0])].name
-            raise NotDifferentiableError(f"the derivative of {name} is not finite")
-        return [float(v) for v in found]
+        return moved, step
 
     def extent(self, dx: Array, dh: Array, dt: Array, reach: Reach) -> float:
         """Largest relative change of anything along the direction."""

@@ -123,6 +123,9 @@ def whole_periods(first: float, stop: float, period: float, periods: int | None,
     """How many periods are taken; raises :class:`InputError` if the run does not hold them."""
     slack = 1e-9 * period
     if start is not None:
+        if not start < stop:
+            ends = f"the run ends at {time.show(stop, 'ms')} already"
+            raise InputError(f"--from {time.show(start, 'ms')}: {ends}; simulate longer (--stop), or begin earlier")
         fit = int(np.floor((stop - max(start, first) + slack) / period))
         if fit < (periods or 1):
             raise InputError(
@@ -236,6 +239,7 @@ def spectra_of_rows(
     lines = min(_lines_below(top, count * period), (m - 1) // 2)
     frequencies = np.arange(1, lines + 1) / (count * period)
     turning = np.exp(-2j * np.pi * frequencies * float(t[-m]))
+    begin = max(float(t[0]), float(t[-1]) - count * period)  # m rows: one end of the window has none
     found = []
     for name in names:
         y = series.values[name][:rows]
@@ -244,8 +248,7 @@ def spectra_of_rows(
         transform = 2 / m * np.fft.rfft(window - mean)[1 : lines + 1] * turning
         change, aliased = _change_of_rows(y, m // count, rms), _aliased(window, transform, turning)
         quantity = quantity_of_unit(series.units.get(name, ""))
-        begin, end = float(t[-m]), float(t[-1] + step)
-        window_facts = (name, quantity, begin, end, period, count)
+        window_facts = (name, quantity, begin, begin + count * period, period, count)
         found.append(Spectrum(*window_facts, frequencies, transform, mean, rms, change, aliased))
     return found
 

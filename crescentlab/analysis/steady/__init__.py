@@ -5,5 +5,6 @@ from crescentlab.analysis.steady.search import (
     OperatingPoint,
     steady,
 )
+from crescentlab.analysis.steady.unrest import MovingError
 
-__all__ = ["Method", "OperatingPoint", "steady"]
+__all__ = ["Method", "MovingError", "OperatingPoint", "steady"]

@@ -19,6 +19,7 @@ from crescentlab.analysis.steady.newton import Found, Newton, NoRestError
 from crescentlab.analysis.steady.pseudo_transient import PseudoTransient
 from crescentlab.analysis.steady.rest import Point, Site
 from crescentlab.analysis.steady.stability import stability
+from crescentlab.analysis.steady.timing import changing
 from crescentlab.analysis.steady.unrest import check_drift, resisting, some
 from crescentlab.circuit import Circuit, Start, snapshot_of
 from crescentlab.elaborate import Design
@@ -98,8 +99,8 @@ def steady(
 def _instant(at: str | float | None) -> float | None:
     try:
         t = QUANTITIES["time"].parse(at) if isinstance(at, str) else at
-    except UnitError as error:
-        raise InputError(f"at: {error.message}") from None
+    except UnitError:
+        raise InputError(f"--at {at}: a time is a number with its unit; write for example 20 ms") from None
     if t is not None and not np.isfinite(t):
         raise InputError(f"at: {t} is no time; write for example 20 ms")
     return t
@@ -190,7 +191,10 @@ class _Search:
         point, linear = found.point, found.linear
         warnings = [
             said
-            for said in (self.site.check(point), check_drift(self.site, point, frozen=self.frozen))
+            for said in (
+                self.site.check(point),
+                check_drift(self.site, point, frozen=self.frozen) or changing(self.site, point),
+            )
             if said is not None
         ]
         warnings += self.undecided(found)

@@ -23,6 +23,14 @@ PROBES = (0.0, 0.0123, 0.317)
 """Times [s] after the present one at which dependence on the time is looked for, so that no extremum hides it."""
 
 
+class MovingError(InputError):
+    """The time itself keeps a circuit from coming to rest: ``why``, and what to do then."""
+
+    def __init__(self, why: str, advice: str) -> None:
+        super().__init__(f"{why}; {advice}")
+        self.why = why
+
+
 def check_drift(site: Site, point: Point, *, frozen: bool) -> str | None:
     """Raise :class:`InputError` if what counts on, the time included, changes the rates of what should come to rest.
 
@@ -50,9 +58,10 @@ def check_drift(site: Site, point: Point, *, frozen: bool) -> str | None:
     said = f"the time itself{_timed(site)} changes {_listed(site, moving['time'])}"
     if frozen:
         return f"{said}; the circuit would come to rest here if the time stood still at {site.t:g} s"
-    raise InputError(
-        f"there is no steady state: {said}; write --at T to let the time stand still there, or use "
-        "crescentlab periodic if the circuit repeats itself"
+    raise MovingError(
+        f"there is no steady state: {said}",
+        "let the time stand still (crescentlab steady --at T), or use crescentlab periodic if the circuit repeats "
+        "itself",
     )
 
 
@@ -83,10 +92,15 @@ def _turning(
 
 
 def _timed(site: Site) -> str:
-    """The components that ask for the time and do not tick: signals."""
-    ticked = {event.name.rpartition(".")[0] for event in site.system.events if event.kind == "every"}
-    asking = [n for n, c in site.system.plan.components.items() if "t" in type(c).asks_for() and n not in ticked]
+    """The components that the time comes in through: signals."""
+    asking = timed(site)
     return f" (through {', '.join(asking[:NAMED])})" if asking else ""
+
+
+def timed(site: Site) -> list[str]:
+    """Names of the components that ask for the time and do not tick."""
+    ticked = {event.name.rpartition(".")[0] for event in site.system.events if event.kind == "every"}
+    return [n for n, c in site.system.plan.components.items() if "t" in type(c).asks_for() and n not in ticked]
 
 
 def _listed(site: Site, rows: Array) -> str:
