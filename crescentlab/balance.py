@@ -2,6 +2,8 @@
 
 .. math:: \\varepsilon = \\frac{\\left|\\int \\sum q \\, dt - \\Delta S\\right|}{\\max_i \\int \\sum |q_i| / 2 \\, dt}
 
+The divisor is no less than a millionth of the largest S: at rest nothing flows but what the solver's tolerance leaves.
+
 S [m^3 at 0 bar gauge] is what the component's own law stores (its ``stores()`` observable). Jumps of S
 at events are booked apart as ``merged``: volumes that are merged or parted take their content along.
 The integral uses the solver's own interpolant at three Gauss nodes per smooth piece.
@@ -16,6 +18,9 @@ import numpy as np
 
 from crescentlab.solvers.trajectory import GAUSS_NODES, GAUSS_WEIGHTS, Trajectory
 from crescentlab.system import System, Values
+
+AT_REST = 1e-6
+"""Where less than this share of the largest content flows, errors are told as shares of that much."""
 
 
 @dataclass(frozen=True)
@@ -63,7 +68,7 @@ def balance(system: System, values: Values, trajectory: Trajectory) -> Balance |
     jumps = trajectory.steps.jumps
     moved = content[:, jumps] - content[:, jumps - 1] if jumps.size else np.zeros((len(contents), 0))
     change = content[:, -1] - content[:, 0] - moved.sum(axis=1)
-    largest = max(float(size.sum(axis=1).max()), 1e-300)
+    largest = max(float(size.sum(axis=1).max()), AT_REST * float(np.abs(content).max()), 1e-300)
     error = into.sum(axis=1) - change
     names = list(contents)
     return Balance(

@@ -128,6 +128,8 @@ def _parse(body: str) -> tuple[ast.expr, dict[str, Value]]:
     except UnitError as error:
         raise ExpressionError(error.message) from None
     except (SyntaxError, ValueError, RecursionError, MemoryError):
+        if body.count("(") > body.count(")"):
+            raise ExpressionError(f"a bracket is left open in {_shown(body)}; close it with )") from None
         hint = " (powers are written with **)" if "^" in body else ""
         raise ExpressionError(
             f"{_shown(body)} is not an expression{hint}; write arithmetic with parameters, for example = pi / 4 * d**2"

@@ -20,6 +20,7 @@ MAX_BYTES = 8_000_000
 MAX_ALIASED = 100_000
 """Most values that aliases may stand for, so that a short file stays short."""
 MAX_DEPTH = 40
+CIRCUIT_BEGINS = "a circuit begins with crescentlab: 1"
 
 _Loader: Any = getattr(yaml, "CBaseLoader", yaml.BaseLoader)
 
@@ -70,8 +71,11 @@ class Node:
         return self.find(path).place
 
 
-def read(path: Path, shown: str | None = None) -> Node:
-    """Read the file; raise :class:`InputError` with file and line for anything that is not YAML."""
+def read(path: Path, shown: str | None = None, begins: str = CIRCUIT_BEGINS) -> Node:
+    """Read the file; raise :class:`InputError` with file and line for anything that is not YAML.
+
+    ``begins`` tells of an empty file what its first line is.
+    """
     name = shown or str(path)
     data = b""
     try:
@@ -92,14 +96,14 @@ def read(path: Path, shown: str | None = None) -> Node:
         raise InputError(
             f"byte 0x{data[error.start]:02x} is not text in UTF-8; save the file as UTF-8", place
         ) from None
-    return parse(text, name)
+    return parse(text, name, begins)
 
 
-def parse(text: str, name: str) -> Node:
+def parse(text: str, name: str, begins: str = CIRCUIT_BEGINS) -> Node:
     """Parse YAML text; ``name`` is the file shown in messages."""
     lines = text.splitlines()
     try:
-        return _Builder(name, lines).build(text)
+        return _Builder(name, lines, begins).build(text)
     except yaml.MarkedYAMLError as error:
         said, line = _explained(error, lines)
         raise InputError(said, Place(name, line)) from None
@@ -213,8 +217,8 @@ def _plain_end(line: str, at: int) -> int:
 class _Builder:
     """Builds the tree from parser events with an explicit stack."""
 
-    def __init__(self, name: str, lines: list[str]) -> None:
-        self.name, self.lines = name, lines
+    def __init__(self, name: str, lines: list[str], begins: str) -> None:
+        self.name, self.lines, self.begins = name, lines, begins
         self.anchors: dict[str, Node] = {}
         self.stack: list[tuple[Node, str | None, str | None]] = []  # node, its anchor, pending key
         self.flow = 0  # how many of the innermost nodes on the stack are written in {} or []
@@ -251,7 +255,7 @@ class _Builder:
                 self.flow = max(self.flow - 1, 0)
                 self.add(node, anchor, event)
         if self.root is None:
-            raise InputError("the file is empty; a circuit begins with crescentlab: 1", Place(self.name, 1))
+            raise InputError(f"the file is empty; {self.begins}", Place(self.name, 1))
         return self.root
 
     def continued(self, event: Any) -> bool:

@@ -382,6 +382,8 @@ def test_a_series_over_time_is_fitted_at_its_times(bench, tmp_path):
     assert found.fitted.theta[0] == pytest.approx(volume, rel=1e-3)
     assert found.fitted.active.all()
     assert len(found.problem.points) == 1
+    assert "differences" in found.fitted.method
+    assert "the data are a series over time; exact derivatives are those of outcomes" in summary(found)
 
 
 def test_rows_of_equal_settings_are_one_run_and_empty_cells_are_left_out(bench):
@@ -411,6 +413,7 @@ def test_an_operating_point_is_fitted(bench, tmp_path):
     more = "uncertainty: {p: 1 %}\nrun: {analysis: steady}"
     found = bench.fit(f"{{{HOLE}}}", data, measured="{p: mean(line.p)}", more=more)
     assert found.fitted.theta[0] == pytest.approx(1e-6, rel=5e-4)
+    assert "exact derivatives are those of analysis: simulate, not steady" in summary(found)
 
 
 def test_pictures(bench):
@@ -443,6 +446,7 @@ def test_the_discharge_coefficient_of_the_example(capsys, tmp_path, monkeypatch)
         assert abs(found["value"] - truth) < 2 * found["standard_error"]
         assert found["low_95"] < truth < found["high_95"]
     assert printed["warnings"] == []
+    assert (printed["derivatives"], printed["derivatives_reason"]) == ("exact", None)
     assert len(printed["measured"]["flow"]["computed"]) == 16
 
 
@@ -498,6 +502,7 @@ SLIPS = {
     "run: {analysis: simulate}": {
         "run: {analysis: simulated}": "run.analysis must be 'simulate', 'periodic' or 'steady'",
         "run: {stop: 5 bar}": "run.stop: ",
+        "run: {window: 2 ms}": "run.window: 2 ms is longer than the run of 0.001 s",
         "run: {time_limit: 5 s}": "run.time_limit belongs to studies",
         "seeds: 3": "unknown key 'seeds': did you mean seed",
     },
@@ -521,7 +526,10 @@ def test_a_slip_in_the_fit_file_is_told_at_its_line(refused: Refusal, line, slip
         ("drop [bar], leak [L/min]\n1, 2.0\n2, a\n", 3, "'a' is not a finite number"),
         ("drop [bar], leak [L/min]\n1, 2.0\n2\n", 3, "1 cells under 2 titles"),
         ("drop [bar], leak [L/minute]\n1, 2.0\n", 1, "column 'leak': unknown unit 'L/minute'"),
-        ("# told\ndrop [mm], leak [L/min]\n1, 2.0\n", 3, "'mm' is a unit of length"),
+        ("# told\ndrop [mm], leak [L/min]\n1, 2.0\n", 2, "column 'drop', which sets drop: 'mm' is a unit of length"),
+        ("drop [L/min], leak [bar]\n1, 2.0\n", 1, "column 'drop', which sets drop: 'L/min' is a unit of flow"),
+        ("drop, leak [L/min]\n1, 2.0\n", 1, "in the title, because drop is a pressure; write for example drop [bar]"),
+        ("drop, leak\n1 bar, 2.0 L/min\n", 1, "in the title, because final(leak) is a flow; write for example leak ["),
         ("drop [bar], leak [L/min]\n1, 2.0\n-1 bar, 3.0\n", 3, "drop: '-1 bar bar': unknown unit"),
         ("drop [bar], leak [L/min]\n1, 2.0\n, 3.0\n", 3, "the cell of 'drop' is empty"),
         ("drop [bar], leak [L/min], leak [L/min]\n1, 2.0, 3\n", 1, "the column 'leak' stands twice"),
@@ -543,7 +551,13 @@ def test_what_no_line_is_to_blame_for(refused: Refusal):
     assert "hole is set by --set and cannot be found" in refused.told("fit", "fit.yaml", "--set", "hole=1 mm^2")
     more = FIT.replace("parameters:", f"parameters:\n  {WIDTH}\n  {HEIGHT}")
     refused.write({"fit.yaml": more})
-    assert "2 measured values cannot fix 3 parameters" in refused.told("fit", "fit.yaml")
+    assert refused.told("fit", "fit.yaml").endswith(
+        "data.csv: 2 measured values cannot fix 3 parameters; measure more, or fit fewer"
+    )
+    refused.write({"data.csv": DATA.removesuffix("2, 3.0\n")})
+    assert "data.csv: 1 measured value cannot fix 3 parameters" in refused.told("fit", "fit.yaml")
+    refused.write({"fit.yaml": ""})
+    assert refused.told("fit", "fit.yaml").endswith("the file is empty; a fit begins with crescentlab_fit: 1")
 
 
 def test_a_fit_without_a_single_row_that_runs_fails(capsys, tmp_path):

@@ -23,6 +23,7 @@ from crescentlab.studies.planning import plan_study
 from crescentlab.studies.points import DONE, FAILED, LOST, SLOW, UNSETTLED
 from crescentlab.studies.progress import Progress, duration
 from crescentlab.studies.provenance import circuit_files
+from crescentlab.studies.store import Store
 from crescentlab.studies.study_file import PlotSection, RunSection, Study, StudyFile, UntilSection, VarySection
 from crescentlab.studies.worker import CHANGED, Workshop, answer
 
@@ -96,6 +97,25 @@ def test_a_point_that_fails_is_a_row_with_its_reason(here: type[Here], capsys: p
 def test_a_study_of_which_nothing_works_fails(here: type[Here], capsys: pytest.CaptureFixture[str]) -> None:
     write(Path(), STUDY.replace("[3 L/min, 6 L/min, 12 L/min]", "[-300 L/min]"))
     assert main(["study", "s.yaml", "--quiet"]) == 3
+    assert capsys.readouterr().err.startswith("no point is done; point 1: ")
+    found = told(capsys, "study", "s.yaml")
+    assert (found["status"], found["error"]) == ("failed", f"no point is done; point 1: {found['table'][0]['reason']}")
+
+
+def test_effects_of_points_that_failed_are_dashes(here: type[Here], capsys: pytest.CaptureFixture[str]) -> None:
+    write(Path(), STUDY.replace("grid: {supply: [3 L/min, 6 L/min, 12 L/min]}",
+                                "one_at_a_time: {supply: -300 L/min +- 10 %}"))  # fmt: skip
+    assert main(["study", "s.yaml"]) == 3
+    out = capsys.readouterr().out
+    assert "nan" not in out
+    assert ["last [bar]", "supply", "-", "-"] in [re.split(r"  +", line.strip()) for line in out.splitlines()]
+
+
+def test_a_folder_around_the_rows_must_be_there(here: type[Here], refused: Refusal) -> None:
+    for more in ([], ["--dry-run"]):
+        said = refused.told("study", "s.yaml", "-o", "nowhere/rows", *more)
+        assert "the folder nowhere does not exist; make it first" in said
+    assert not Path("nowhere").exists()
 
 
 def test_an_outcome_that_is_not_finite_is_told(here: type[Here], capsys: pytest.CaptureFixture[str]) -> None:
@@ -205,6 +225,44 @@ def test_an_interrupted_study_goes_on_where_it_was(here: type[Here], capsys: pyt
     assert told(capsys, "study", "s.yaml")["ran"] == 0
 
 
+def test_points_kept_before_count_as_kept_and_only_rows_stay(
+    here: type[Here], capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Interrupted after one point, then after one more: two are kept; no empty journal and no lock stay."""
+    for stop_after in (1, 2):
+        here.stop_after = stop_after
+        assert main(["study", "s.yaml", "--quiet"]) == 130
+        assert f"{stop_after} point{'s' * (stop_after > 1)} kept in s.results" in capsys.readouterr().err
+        assert {p.name for p in Path("s.results").iterdir()} == {
+            "manifest.json", *(f"part-{k:05d}.parquet" for k in range(1, stop_after + 1))
+        }  # fmt: skip
+
+
+def test_a_lock_taken_away_in_between_is_taken_anew(
+    here: type[Here], refused: Refusal, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Another process that ends removes the file between opening and locking: a lock on the old file binds nobody."""
+    import fcntl
+
+    locked, times = fcntl.flock, []
+
+    def slowly(file: io.TextIOWrapper, how: int) -> None:
+        if not times:
+            Path("s.results/lock").unlink()
+        times.append(how)
+        locked(file, how)
+
+    monkeypatch.setattr(fcntl, "flock", slowly)
+    store = Store(Path("s.results"))
+    store.open(plan_study(Study.read(Path("s.yaml"))))
+    monkeypatch.undo()
+    monkeypatch.chdir(refused.folder)
+    assert len(times) == 2
+    assert "another process is running this study" in refused.told("study", "s.yaml", "--quiet")
+    store.close("complete")
+    assert not Path("s.results/lock").exists()
+
+
 def test_added_points_are_the_only_ones_that_run(here: type[Here], capsys: pytest.CaptureFixture[str]) -> None:
     """Also if a value is written in another unit: 3 L/min is 0.05 L/s."""
     before = told(capsys, "study", "s.yaml")["table"]
@@ -279,7 +337,7 @@ def test_rows_go_into_parts_as_the_journal_grows(
     parts = sorted(Path("s.results").glob("part-*.parquet"))
     assert [pq.read_table(part).num_rows for part in parts] == [2, 1]
     assert pq.read_table(parts[0]).schema.field("last").metadata == {b"units": b"Pa"}
-    assert Path("s.results/journal.jsonl").read_text(encoding="utf-8") == ""
+    assert not Path("s.results/journal.jsonl").exists()
     assert told(capsys, "study", "s.yaml")["table"] == first
 
 

@@ -253,6 +253,14 @@ MISTAKES = {
     "a time without a unit": (STUDY.replace("stop: 20 ms, window: 5 ms}", f"stop: 20}}{MARK}"), "a time needs a unit"),
     "an expression for a time that is none": (
         STUDY.replace("stop: 20 ms, window: 5 ms}", f"stop: = supply}}{MARK}"), "the expression gives a flow"),
+    "a window longer than the run": (
+        STUDY.replace("window: 5 ms}", f"window: 100 ms}}{MARK}"),
+        "run.window: 100 ms is longer than the run with stop: 20 ms"),
+    "a window longer than the circuit's own run": (
+        STUDY.replace("stop: 20 ms, window: 5 ms}", f"window: = 2 * size / (1 m^2/s) * 1e5}}{MARK}"),
+        "longer than the run of 0.02 s, the circuit's own stop"),
+    "a bracket left open": (
+        STUDY.replace("{pressure: mean(line.p)}", f"{{pressure: 'mean(line.p'}}{MARK}"), "a bracket is left open"),
     "a solver that there is not": (STUDY.replace("window: 5 ms}", f"solver: rods}}{MARK}"), "did you mean rodas"),
     "a period of a simulation": (
         STUDY.replace("window: 5 ms}", f"period: 5 ms}}{MARK}"), "belongs to analysis: periodic"),
@@ -296,7 +304,7 @@ def test_the_study_that_the_mistakes_are_made_in_is_accepted(refused: Refusal) -
 @pytest.mark.parametrize(
     ("text", "said"),
     [
-        ("", "the file is empty"),
+        ("", "the file is empty; a study begins with crescentlab_study: 1"),
         ("crescentlab: 1\ncomponents: {}\n", "begins with `crescentlab_study: 1`"),
         ("- a\n", "begins with `crescentlab_study: 1`"),
     ],

@@ -39,6 +39,7 @@ def _facts(found: Fit) -> list[tuple[str, str]]:
         ("search", f"{counted(problem.starts, 'start')}, {counted(len(fitted.minima), 'minimum', 'minima')}; "
                    f"{counted(fitted.evaluations, 'set')} of parameters, {counted(found.runs, 'run')}"),
         ("derivatives", _derivatives(fitted)),
+        *([("", found.inexact)] if found.inexact else []),
     ]  # fmt: skip
     if fitted.freedom > 0 and not fitted.estimated:
         freedom = f"{counted(fitted.freedom, 'degree')} of freedom"

@@ -50,7 +50,7 @@ def run(options: argparse.Namespace) -> int:
         raise InputError("--workers is for this machine, --scheduler for a cluster; give one of them")
     study = Study.read(Path(options.study))
     planned = plan_study(study, no_code=options.no_code)
-    store = Store(conduct.results_folder(study.path, options.output))
+    store = Store(_folder(study, options.output))
     if options.dry_run:
         return _dry_run(planned, store, options)
     store.open(planned, fresh=options.fresh)
@@ -69,7 +69,7 @@ def run(options: argparse.Namespace) -> int:
     try:
         conduct.conduct(planned, store, jobs, runner, progress)
     except KeyboardInterrupt:
-        done = counted(progress.statuses.total(), "point")
+        done = counted(sum(key in store.rows for key in planned.keys), "point")
         raise KeyboardInterrupt(f"interrupted; {done} kept in {store.folder}, the same command goes on") from None
     rows = conduct.table(planned, store)
     files = [*tables.write_table(store.folder, planned, rows), *_pictures(planned, rows, store.folder)]
@@ -77,11 +77,29 @@ def run(options: argparse.Namespace) -> int:
         print(json.dumps(report(planned, rows, store, len(jobs), files), indent=2, ensure_ascii=False))
     elif not options.quiet:
         print(summary(planned, rows, len(jobs), progress, files))
+    if error := _error(rows):
+        print(error, file=sys.stderr)
     return DONE if _any_good(rows) else FAILED
+
+
+def _folder(study: Study, output: str | None) -> Path:
+    """Where rows are kept; the folder around it must be there."""
+    folder = conduct.results_folder(study.path, output)
+    if not folder.parent.is_dir():
+        raise InputError(f"-o {folder}: the folder {folder.parent} does not exist; make it first")
+    return folder
 
 
 def _any_good(rows: list[Row]) -> bool:
     return any(row["status"] == GOOD for row in rows)
+
+
+def _error(rows: list[Row]) -> str | None:
+    """Why a study of which nothing works failed: the first reason; None if any point is done."""
+    if _any_good(rows):
+        return None
+    first = next((row for row in rows if row["reason"]), None)
+    return "no point is done" + (f"; point {first['point']}: {first['reason']}" if first else "")
 
 
 def _pictures(planned: Planned, rows: list[Row], folder: Path) -> list[Path]:
@@ -142,7 +160,7 @@ def report(planned: Planned, rows: list[Row], store: Store, ran: int, files: lis
         "units": {n: q.si for n, q in {**planned.quantities, **planned.measures}.items() if q},
         "table": [{name: _finite(v) for name, v in row.items() if name != "settings"} for row in rows],
         "folder": str(store.folder), "files": [str(path) for path in files], "warnings": _warnings(rows),
-        "error": None,
+        "error": _error(rows),
     }  # fmt: skip
 
 

@@ -53,7 +53,7 @@ class FitFile(_Section):
 
 def read_fit_file(path: Path) -> tuple[FitFile, Node]:
     """The sections of a fit file, and its text with places; raises :class:`InputError` with file and line."""
-    node = read(path)
+    node = read(path, begins="a fit begins with crescentlab_fit: 1")
     if not isinstance(node.value, dict) or "crescentlab_fit" not in node.value:
         raise InputError("a fit file is a mapping that begins with `crescentlab_fit: 1`", node.place)
     return validated(FitFile, node), node

@@ -18,9 +18,19 @@ from crescentlab.errors import InputError, SimulationError
 from crescentlab.studies.fit_problem import Point, Problem
 from crescentlab.studies.points import DONE, Job, run_point, seconds
 from crescentlab.studies.provenance import Source
+from crescentlab.studies.study_file import RunSection
 from crescentlab.units import QUANTITIES
 
 Array = np.ndarray
+
+
+def _not_exact(run: RunSection, series: bool) -> str:
+    """Why runs of this kind have no exact derivatives; empty where they may have."""
+    if series:
+        return "the data are a series over time; exact derivatives are those of outcomes"
+    if run.analysis != "simulate":
+        return f"exact derivatives are those of analysis: simulate, not {run.analysis}"
+    return "exact derivatives need an end of the run that is given, not until:" if run.until is not None else ""
 
 
 class CircuitModel:
@@ -35,8 +45,8 @@ class CircuitModel:
         self._answers: list[list[int]] = self._values_of_points()
         self._warm = False
         run = problem.file.run
-        self._exact = run.analysis == "simulate" and run.until is None and problem.times is None
-        """Whether exact derivatives may still be had."""
+        self.reason = _not_exact(run, problem.times is not None)
+        """Why derivatives are not exact; empty while they may be."""
         self._checked = False
 
     def _values_of_points(self) -> list[list[int]]:
@@ -105,7 +115,7 @@ class CircuitModel:
 
         Before they are relied on, those of the first point are compared with a difference.
         """
-        if not self._exact:
+        if self.reason:
             return None
         made = np.full((len(self.problem.where), theta.size), np.nan)
         for point, answers in zip(self.problem.points, self._answers, strict=True):
@@ -113,7 +123,6 @@ class CircuitModel:
                 continue
             slopes = self.slopes(self.settings(point, theta))
             if slopes is None:
-                self._exact = False
                 return None
             for value in answers:
                 made[value] = slopes[self.problem.where[value, 1]]
@@ -134,10 +143,15 @@ class CircuitModel:
                 rtol=run.rtol or problem.circuit.netlist.sections.simulation.rtol, compile=run.compile,
                 check=not self._checked,
             )  # fmt: skip
-        except (SimulationError, InputError):
+        except (SimulationError, InputError) as error:
+            self.reason = error.message if isinstance(error, InputError) else str(error)
             return None
         self._checked = True
-        return found.derivative if set(found.method) == {"exact"} else None
+        if set(found.method) == {"exact"}:
+            return found.derivative
+        k = next(k for k, method in enumerate(found.method) if method != "exact")
+        self.reason = f"{found.parameters[k].name}: {found.reason[k]}"
+        return None
 
     # -- one run ---------------------------------------------------------------------------------
 

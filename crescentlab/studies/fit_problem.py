@@ -15,7 +15,8 @@ from crescentlab.errors import InputError, Place, UnitError, nearest
 from crescentlab.studies.fit_data import Table, read_table
 from crescentlab.studies.fit_file import FitFile, ParameterSection, read_fit_file
 from crescentlab.studies.fit_scales import Data, Scale
-from crescentlab.studies.points import seconds
+from crescentlab.studies.fitting import too_few
+from crescentlab.studies.points import check_window, seconds
 from crescentlab.studies.targets import quantity_of_setting
 from crescentlab.system import System
 from crescentlab.units import QUANTITIES, Quantity, normalise
@@ -131,20 +132,13 @@ class _Reading:
         measured = tuple(self.measured(column, text, start) for column, text in self.file.measured.items())
         self.check_run(start)
         data, where = self.data(measured)
+        if data.measured.size < len(parameters):
+            raise InputError(f"{self.table.path}: {too_few(data.measured.size, len(parameters))}")
         times = self.times()
         return Problem(
-            self.file,
-            self.path.stem,
-            self.circuit,
-            self.table,
-            parameters,
-            measured,
-            points,
-            times,
-            data,
-            where,
+            self.file, self.path.stem, self.circuit, self.table, parameters, measured, points, times, data, where,
             starts,
-        )
+        )  # fmt: skip
 
     def check_names(self) -> None:
         """Every column named exists and serves one purpose; every parameter is found or set, not both."""
@@ -226,8 +220,34 @@ class _Reading:
         try:
             self.circuit.design(settings)
         except InputError as error:
+            self.check_titles(point)
             place = self.blamed(error, parameters, point)
             raise InputError(error.message.removeprefix("--set ") if place else error.message, place) from None
+
+    def check_titles(self, point: Point) -> None:
+        """Refuse titles of setting columns without a unit, or with one of another quantity: every row has it."""
+        design = self.circuit.design(self.set)
+        for column, name in self.file.settings.items():
+            title, cell = self.table.columns[column], self.table.columns[column].cells[point.rows[0]]
+            try:
+                quantity = quantity_of_setting(design, name)
+            except InputError:
+                continue  # told as a name that there is not
+            if quantity is None or not _LEADING_NUMBER.fullmatch(cell) or normalise(title.unit) in quantity.units:
+                continue
+            if not title.unit:
+                raise self.no_unit(column, name, quantity)
+            try:
+                quantity.factor(title.unit)
+            except UnitError as error:
+                said = f"column {column!r}, which sets {name}: {error.message}"
+                raise InputError(said, self.table.top) from None
+
+    def no_unit(self, column: str, of: str, quantity: Quantity) -> InputError:
+        """What is said of a title that lacks its unit."""
+        unit = quantity.example().partition(" ")[2]
+        said = f"column {column!r} needs its unit in the title, because {of} is {quantity.titled}"
+        return InputError(f"{said}; write for example {column} [{unit}]", self.table.top)
 
     def blamed(self, error: InputError, parameters: tuple[Parameter, ...], point: Point) -> Place | None:
         """Where the name stands that a message about ``--set NAME`` speaks of."""
@@ -262,8 +282,10 @@ class _Reading:
         unit = self.table.columns[column].unit
         if normalise(unit) not in quantity.units:
             owners = [q for q in QUANTITIES.values() if normalise(unit) in q.units and q.dims == quantity.dims]
+            if not unit:
+                raise self.no_unit(column, text, quantity)
             if not owners:
-                said = f"the column {column!r} is in {unit or 'no unit'}, but {text} is {quantity.titled}"
+                said = f"the column {column!r} is in {unit}, but {text} is {quantity.titled}"
                 raise InputError(f"{said} [{quantity.si}]", place)
             quantity = owners[0]
         return Measured(column, outcome, quantity, unit)
@@ -293,6 +315,11 @@ class _Reading:
                     seconds(text, design)
                 except InputError as error:
                     raise InputError(f"run.{name}: {error.message}", self.node.place_of("run", name)) from None
+        if TIME not in self.table.columns:
+            try:
+                check_window(run, design, self.circuit.netlist.sections.simulation.stop)
+            except InputError as error:
+                raise InputError(f"run.window: {error.message}", self.node.place_of("run", "window")) from None
         if run.time_limit is not None:
             said = "run.time_limit belongs to studies, whose points run in processes of their own; remove it"
             raise InputError(said, self.node.place_of("run", "time_limit"))

@@ -38,6 +38,8 @@ class Fit:
     """Rows whose run failed at the solution, and why."""
     runs: int
     warnings: list[str]
+    inexact: str
+    """Why derivatives are not exact; empty where they are."""
 
     @property
     def residuals(self) -> np.ndarray:
@@ -59,7 +61,7 @@ def run_fit(problem: Problem, *, workers: int | None = None, progress: Callable[
     rows = sorted({int(row) for row, _ in problem.where[~fitted.active]})
     failures = {row: model.failures.get(row, "no value") for row in rows}
     said = [*_weak(problem, model, fitted), *_doubts(problem, fitted, failures)]
-    return Fit(problem, fitted, failures, model.runs, said)
+    return Fit(problem, fitted, failures, model.runs, said, model.reason)
 
 
 # -- warnings ------------------------------------------------------------------------------------
@@ -184,7 +186,8 @@ def report(found: Fit) -> dict[str, Any]:
         "failed_starts": list(fitted.failed_starts),
         "failed_rows": [{"line": problem.table.places[row].line, "reason": why} for row, why in found.failures.items()],
         "measured": _residuals(found),
-        "derivatives": fitted.method, "difference_step": fitted.step, "noise": fitted.noise,
+        "derivatives": fitted.method, "derivatives_reason": found.inexact or None, "difference_step": fitted.step,
+        "noise": fitted.noise,
         "linearity": list(fitted.linearity.growth),
         "evaluations": fitted.evaluations, "runs": found.runs, "warnings": found.warnings, "error": None,
     }  # fmt: skip

@@ -123,6 +123,12 @@ def starting_points(start: Array, scale: Scale, number: int, seed: int) -> list[
     return [inside, *qmc.LatinHypercube(d=start.size, seed=seed).random(number - 1)]
 
 
+def too_few(values: int, parameters: int) -> str:
+    """What is said of fewer values than parameters."""
+    measured = f"{values} measured value{'' if values == 1 else 's'}"
+    return f"{measured} cannot fix {parameters} parameters; measure more, or fit fewer"
+
+
 def fit(
     model: Model, data: Data, start: Array, scale: Scale, *, starts: int = 1, seed: int = 1,
     progress: Callable[[float], None] | None = None,
@@ -132,8 +138,7 @@ def fit(
     Raises :class:`InputError` if there are fewer values than parameters, :class:`SimulationError` if every start fails.
     """
     if data.measured.size < start.size:
-        said = f"{data.measured.size} measured values cannot fix {start.size} parameters"
-        raise InputError(f"{said}; measure more, or fit fewer")
+        raise InputError(too_few(data.measured.size, start.size))
     search = _Search(model, data, scale)
     ends: list[_End] = []
     failed: list[int] = []

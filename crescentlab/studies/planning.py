@@ -18,7 +18,7 @@ from crescentlab.elaborate import Design
 from crescentlab.errors import InputError, UnitError, nearest
 from crescentlab.expressions import Value, is_expression
 from crescentlab.studies import provenance
-from crescentlab.studies.points import Job, seconds, settling, within
+from crescentlab.studies.points import Job, check_window, seconds, settling, within
 from crescentlab.studies.sampling import Point, points, varied
 from crescentlab.studies.study_file import BOOKKEEPING, Study
 from crescentlab.studies.targets import quantity_of_setting
@@ -113,7 +113,7 @@ def plan_study(study: Study, *, no_code: bool = False) -> Planned:
     first = {**study.sections.settings, **made[0].settings}
     design = _tried(study, circuit, first)
     measures = _measures(study, circuit, design, first)
-    _check_times(study, design)
+    _check_times(study, circuit, design)
     _check_plots(study, {**quantities, **measures})
     display = {**DISPLAY, **circuit.netlist.sections.display}
     return Planned(study, path, no_code, made, quantities, measures, provenance.Source.of(path, design), display)
@@ -170,7 +170,7 @@ def _measures(study: Study, circuit: Circuit, design: Design, settings: Mapping[
     return found
 
 
-def _check_times(study: Study, design: Design) -> None:
+def _check_times(study: Study, circuit: Circuit, design: Design) -> None:
     run = study.sections.run
     texts = {("run", name): getattr(run, name) for name in ("stop", "window", "period")}
     texts["run", "until", "every"] = run.until.every if run.until is not None else None  # type: ignore[index]
@@ -181,6 +181,10 @@ def _check_times(study: Study, design: Design) -> None:
             seconds(text, design)
         except InputError as error:
             raise type(error)(f"{'.'.join(path)}: {error.message}", study.place(*path)) from None
+    try:
+        check_window(run, design, circuit.netlist.sections.simulation.stop)
+    except InputError as error:
+        raise InputError(f"run.window: {error.message}", study.place("run", "window")) from None
 
 
 def _check_plots(study: Study, columns: Mapping[str, Quantity | None]) -> None:

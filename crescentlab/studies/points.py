@@ -25,6 +25,8 @@ from crescentlab.units import QUANTITIES
 DONE, UNSETTLED, FAILED, SLOW, LOST = "done", "unsettled", "failed", "slow", "lost"
 """What became of a point. ``unsettled``: it ran, but did not come to rest within what it was allowed; ``slow``: it took
 longer than its time limit; ``lost``: its process died."""
+WINDOW_SLACK = 1e-9
+"""A window may be longer than its run by this share, which is roundoff of times."""
 
 
 @dataclass(frozen=True)
@@ -139,6 +141,18 @@ def seconds(text: str, design: Design) -> float:
     return found
 
 
+def check_window(run: RunSection, design: Design, stop: float) -> None:
+    """Refuse a window longer than the run; ``stop`` [s] is the circuit's, for a run section that names none."""
+    if run.window is None:
+        return
+    end = stop if run.stop is None else seconds(run.stop, design)
+    window = seconds(run.window, design)
+    if window > end * (1 + WINDOW_SLACK):
+        said = f"{run.window}, {window:g} s" if is_expression(run.window) else run.window
+        until = f"of {end:g} s, the circuit's own stop" if run.stop is None else f"with stop: {run.stop}"
+        raise InputError(f"{said} is longer than the run {until}; write a shorter window or a later stop")
+
+
 def _options(run: RunSection) -> dict[str, Any]:
     given = {"solver": run.solver, "rtol": run.rtol, "compile": run.compile}
     return {name: value for name, value in given.items() if value is not None}
@@ -156,7 +170,7 @@ def _simulate(circuit: Circuit, job: Job, design: Design) -> _Ran:
         return _Ran(result, None, FAILED, result.trajectory.error, steps)
     end = float(result.trajectory.steps.t[-1])
     begin = None if run.window is None else end - seconds(run.window, design)
-    if begin is not None and begin < -1e-9 * end:
+    if begin is not None and begin < -WINDOW_SLACK * end:
         said = f"the run ended at {end:g} s, before a window of {end - begin:g} s was full"
         return _Ran(result, None, FAILED, said, steps)
     return _Ran(result, Window(result, None if begin is None else max(begin, 0.0)), steps=steps)

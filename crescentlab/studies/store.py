@@ -124,14 +124,21 @@ class Store:
             raise
 
     def _take_lock(self) -> None:
-        self._lock = (self.folder / LOCK).open("a+")
+        """Lock the folder, again if the process before removed the file in between: a lock on it would bind nobody."""
+        path = self.folder / LOCK
         try:
             import fcntl
 
-            fcntl.flock(self._lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            while self._lock is None:
+                self._lock = path.open("a+")
+                fcntl.flock(self._lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+                if not path.exists() or not os.path.samestat(os.fstat(self._lock.fileno()), path.stat()):
+                    self._lock.close()
+                    self._lock = None
         except ImportError:
             return
         except BlockingIOError:
+            assert self._lock is not None
             self._lock.close()
             self._lock = None
             raise InputError(
@@ -173,10 +180,14 @@ class Store:
         self.release()
 
     def release(self) -> None:
-        """Let other processes add rows."""
-        for file in (self._journal, self._lock):
-            if file is not None:
-                file.close()
+        """Let other processes add rows; an empty journal and the lock are taken away."""
+        if self._journal is not None:
+            self._journal.close()
+            if not self.journalled:
+                (self.folder / JOURNAL).unlink(missing_ok=True)
+        if self._lock is not None:
+            (self.folder / LOCK).unlink(missing_ok=True)  # while it is held, so that nobody else's is removed
+            self._lock.close()
         self._journal = self._lock = None
 
     def _write_manifest(self, state: str) -> None:

@@ -189,7 +189,7 @@ class Study:
         """Read and check a study file; raises :class:`InputError` at the offending line."""
         if not path.is_file():
             raise InputError(f"{path}: no such file; a study is a .yaml file that begins with `crescentlab_study: 1`")
-        node = read(path)
+        node = read(path, begins="a study begins with crescentlab_study: 1")
         if not isinstance(node.value, dict) or "crescentlab_study" not in node.value:
             place = node.place if not isinstance(node.value, dict) or not node.value else Place(str(path), 1)
             raise InputError("a study file is a mapping that begins with `crescentlab_study: 1`", place)

@@ -126,8 +126,13 @@ def effect_rows(planned: Planned, rows: Sequence[Row]) -> list[Cells]:
     for measure, quantity in planned.measures.items():
         factor = quantity.factor(named[measure])
         for name, low, high in effects(planned, rows, measure):
-            made.append((heading(measure, named[measure]), name, f"{low / factor:+.4g}", f"{high / factor:+.4g}"))
+            made.append((heading(measure, named[measure]), name, _change(low / factor), _change(high / factor)))
     return made
+
+
+def _change(value: float) -> str:
+    """A signed cell; a dash where a point that it needs did not go well."""
+    return "-" if np.isnan(value) else f"{value:+.4g}"
 
 
 def write_table(folder: Path, planned: Planned, rows: Sequence[Row]) -> list[Path]:
