@@ -1,26 +1,18 @@
-"""The examination of a circuit: modes, what limits the step, events, energy and lines, against closed forms."""
+"""The examination of a circuit: modes, what limits the step, events and energy, against closed forms."""
 
 from __future__ import annotations
 
 import json
-import re
 from pathlib import Path
 
 import numpy as np
 import pytest
 from building import OIL, alone, circuit
-from crescentlab.components.pipes import (
-    PipeCapacitiveCapacitive,
-    PipeCapacitiveInertial,
-    PipeInertialCapacitive,
-    PipeInertialInertial,
-)
 
 import crescentlab as cl
 from crescentlab import compiler
 from crescentlab.analysis.doctor import advice, bound_of, examine, mode_text, time_text
 from crescentlab.analysis.doctor.activity import activities, indices
-from crescentlab.analysis.doctor.line_errors import Ends, chain, line_errors, own_two_port, scattering_error
 from crescentlab.analysis.doctor.run_modes import run_modes
 from crescentlab.analysis.linear.modes import Mode
 from crescentlab.circuit import Circuit
@@ -211,9 +203,8 @@ def test_ticks_are_counted_and_held_values_named() -> None:
     assert found.happened["line.pipe"] == {"tick": ticks}
     assert set(found.ticking) == {"line.pipe"}
     pipe = next(line for line in found.lines if line.name == "line.pipe")
-    assert pipe.within
-    assert pipe.note.startswith("not judged: it steps by ticks")
-    assert not pipe.errors.size
+    assert pipe.errors.size == pipe.frequencies.size > 0
+    assert pipe.frequencies.max() <= 0.25 * ticks / found.span * (1 + 1 / ticks)  # a quarter of the tick rate
     assert found.activity["gears"] < 1e-9 * found.activity["shaft"]  # it hands on what it takes
 
 
@@ -261,124 +252,6 @@ def test_a_spring_and_its_mass_exchange_energy() -> None:
     found = activities(bench.simulate(period, solver="rodas", rtol=1e-9))
     assert found["spring"] == pytest.approx(4 * 1000 * 1e-4 / 2, rel=1e-3)  # its sign changes inside four steps
     assert found["mass"] == pytest.approx(found["spring"], rel=1e-9)
-
-
-# -- lines ---------------------------------------------------------------------------------------
-
-PIPE = {"length": 0.5, "diameter": 0.01, "roughness": 0.0, "loss_coefficient": 0.0}
-
-
-def pulsating(pipe: dict[str, object], frequency: str = "400 Hz") -> Circuit:
-    """A pulsating flow through a volume, a pipe and a throttle."""
-    parts = {
-        "wave": {"type": "sine", "mean": "20 L/min", "amplitude": "0.3 L/min", "frequency": frequency},
-        "pump": {"type": "signal_flow_source"},
-        "volume": {"type": "capacity", "volume": "50 cm^3", "start": {"p": "2.5 bar"}},
-        "pipe": {"type": "pipe", "diameter": "10 mm", "start": {"p": "2.5 bar", "q": "20 L/min"}, **pipe},
-        "hole": {"type": "throttle", "area": "20 mm^2"},
-        "tank": {"type": "tank"},
-    }
-    nets = {
-        "asked": ["wave.y", "pump.flow"],
-        "p1": ["pump.port", "volume.port", "pipe.a"],
-        "p2": ["pipe.b", "hole.a"],
-        "p3": ["hole.b", "tank.port"],
-    }
-    period = "'= 1 / 400 Hz'" if frequency == "400 Hz" else "25 ms"
-    return circuit(components=parts, nets=nets, fluid=OIL, simulation={"stop": "50 ms", "period": period.strip("'")})
-
-
-def test_a_lumped_pipe_has_the_two_port_of_its_equations() -> None:
-    """Capacity then inertia: q_a = j w C p_a + q, (j w I + R) q = p_a - p_b; C = A l/beta, I = rho l/A."""
-    area = np.pi / 4 * 1e-4
-    form = PipeCapacitiveInertial.model_construct(**PIPE)
-    oil = pulsating({"length": "0.5 m"}).design().fluids["fluid"]
-    omega = 2 * np.pi * np.array([10.0, 400.0])
-    own = own_two_port(form, oil, omega, Ends(0.0, 0.0, 0.0, 0.0))
-    C, inertance = area * 0.5 / BETA, RHO * 0.5 / area
-    resistance = 128 * RHO * NU * 0.5 / (np.pi * 0.01**4)
-    series = 1 / (1j * omega * inertance + resistance)
-    exact = np.array([[1j * omega * C + series, -series], [-series, series]]).transpose(2, 0, 1)
-    assert own is not None
-    assert np.abs(own / exact - 1).max() < 1e-3  # friction is smoothed near rest
-
-
-@pytest.mark.parametrize(
-    "form", [PipeCapacitiveCapacitive, PipeInertialInertial, PipeCapacitiveInertial, PipeInertialCapacitive]
-)
-def test_lumps_in_series_come_to_the_line(form: type[Component]) -> None:
-    """N lumps err by (w l/a)^2/N^2 and less: at 400 Hz, and with no losses but those of the model, 64 are a line.
-
-    The line here is the exact one with the resistance of steady flow, tanh and all (Wylie & Streeter 1993, chapter 12).
-    """
-    from crescentlab.components.two_ports import two_port_of
-
-    oil = pulsating({"length": "0.5 m"}).design().fluids["fluid"]
-    omega = 2 * np.pi * np.array([50.0, 400.0])
-    area = np.pi / 4 * 1e-4
-    series = 1j * omega * RHO / area + 128 * RHO * NU / (np.pi * 0.01**4)
-    exact = two_port_of(series, 1j * omega * area / BETA, 0.5)
-    ends, part = Ends(0.0, 0.0, 0.0, 0.0), form.model_construct(**PIPE)
-    coarse, middle, fine = (scattering_error(chain(part, n, oil, omega, ends), exact).max() for n in (4, 16, 64))
-    assert coarse > 1.5 * middle > 2 * fine
-    assert fine < 0.02
-
-
-def advised(note: str) -> dict[str, object]:
-    """The component that the advice writes, with a start near rest."""
-    match = re.fullmatch(r"write \{(.*)\}", note)
-    assert match is not None, note
-    written: dict[str, object] = dict(pair.split(": ") for pair in match[1].split(", "))
-    return {**written, "start": {"p_node": "2.5 bar", "q_node": "20 L/min"}}
-
-
-def test_a_coarse_pipe_is_told_and_the_advice_passes() -> None:
-    """1 m is 0.31 of a wave of 400 Hz at 1276 m/s: one lump is wrong by more than half; what is advised is right.
-
-    The cells are the fewest: with one less the same bound is missed.
-    """
-    found = examine(pulsating({"length": "1 m"}), line_error=0.1)
-    (line,) = found.lines
-    assert not line.within
-    assert line.worst[0] > 0.5
-    assert line.frequencies == pytest.approx([400.0])
-    assert any(said.startswith("pipe (pipe) is ") and said.endswith(line.note) for said in advice(found))
-    fine = advised(line.note)
-    assert fine["type"] == "distributed_line"
-    assert fine["length"] == "1000 mm"
-    cells = int(str(fine["cells"]))
-    assert cells == line.parts
-    again = [examine(pulsating({**fine, "cells": str(n)}), line_error=0.1).lines[0] for n in (cells, cells - 1)]
-    enough, too_few = (float(each.errors[np.isclose(each.frequencies, 400.0)][0]) for each in again)
-    assert enough <= 0.1 < too_few  # the finer line also carries 1200 Hz, which the throttle makes of 400
-
-
-def test_a_short_pipe_is_let_pass() -> None:
-    """A hundredth of a wave: one lump is right to some (w l/a)^2/6 and to the losses that depend on frequency."""
-    found = examine(pulsating({"length": "31.25 mm"}), line_error=0.1)
-    assert found.lines[0].within
-    assert not any("is allowed" in said for said in advice(found))
-
-
-def test_where_friction_is_missing_its_terms_are_advised() -> None:
-    """At 400 Hz laminar friction is sqrt(w R^2/(8 nu))/4 = 3.7 times Poiseuille's (Zielke 1968): no cells have that."""
-    found = examine(pulsating({"length": "1 m"}), line_error=0.02)
-    fine = advised(found.lines[0].note)
-    assert int(str(fine["friction_terms"])) > 0
-    assert examine(pulsating(fine), line_error=0.02).lines[0].within
-
-
-def test_nothing_is_said_of_a_line_in_which_nothing_moves() -> None:
-    parts = {
-        "volume": {"type": "capacity", "volume": "50 cm^3"},
-        "pipe": {"type": "pipe", "diameter": "10 mm", "length": "1 m"},
-        "end": {"type": "plug"},
-    }
-    nets = {"p1": ["volume.port", "pipe.a"], "p2": ["pipe.b", "end.port"]}
-    still = circuit(components=parts, nets=nets, fluid=OIL, simulation={"stop": "10 ms"})
-    (line,) = line_errors(still.simulate(solver="rodas"), still.library, None, 0.05)
-    assert line.within
-    assert line.note == "nothing oscillates in it"
 
 
 # -- the command ---------------------------------------------------------------------------------

@@ -7,6 +7,7 @@ import json
 import math
 
 from crescentlab.analysis.doctor import Examination, advice, bound_of, examine, hertz_text, mode_text, report, time_text
+from crescentlab.analysis.doctor.line_errors import LineError
 from crescentlab.analysis.linear.modes import Mode
 from crescentlab.circuit import load
 from crescentlab.cli import DONE
@@ -140,10 +141,21 @@ def _lines(found: Examination) -> str:
     rows = [("line", "type", "error", "at")]
     for line in found.lines:
         if line.errors.size:
-            rows.append((line.name, line.type, f"{100 * line.worst[0]:.3g} %", hertz_text(line.worst[1])))
+            rows.append(
+                (line.name, line.type, f"{100 * line.worst[0]:.3g} %", hertz_text(line.worst[1]) + _beyond(line))
+            )
         else:
             rows.append((line.name, line.type, "", line.note))
     return table(rows, right=(2,), indent="  ")
+
+
+def _beyond(line: LineError) -> str:
+    """What was left out of the judgement of a line that ticks."""
+    if not line.left_out:
+        return ""
+    above = ", ".join(hertz_text(f) for f in line.left_out[:TAKING_PART])
+    more = ", ..." if len(line.left_out) > TAKING_PART else ""
+    return f"; not judged above a quarter of its tick rate: {above}{more}"
 
 
 def _advice(found: Examination) -> str:

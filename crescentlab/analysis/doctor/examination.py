@@ -287,7 +287,7 @@ def report(found: Examination) -> dict[str, Any]:
         "lines": [
             {"name": line.name, "type": line.type, "frequencies": line.frequencies.tolist(),
              "errors": line.errors.tolist(), "bound": line.bound, "within": line.within, "note": line.note or None,
-             "parts": line.parts}
+             "parts": line.parts, "left_out": list(line.left_out)}
             for line in found.lines
         ],
         "advice": advice(found), "warnings": list(found.result.trajectory.warnings), "error": None,
