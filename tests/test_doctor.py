@@ -316,3 +316,21 @@ def test_the_bound_is_a_ratio() -> None:
     assert bound_of("5 %") == pytest.approx(0.05)
     with pytest.raises(InputError, match="between 0 and 200 %"):
         bound_of("0")
+
+
+def test_what_is_fast_at_the_start_alone_makes_no_circuit_stiff():
+    """An orifice at zero drop is laminar and fast; within microseconds it is not, and dopri takes few steps."""
+    oil = {"type": "simple_oil", "density": "860 kg/m^3", "kinematic_viscosity": "35 cSt", "bulk_modulus": "14000 bar"}
+    bench = circuit(
+        components={
+            "pump": {"type": "flow_source", "flow": "10 L/min"}, "line": {"type": "capacity", "volume": "100 cm^3"},
+            "hole": {"type": "orifice", "area": "3 mm^2", "lambda_c": "1"}, "tank": {"type": "tank"},
+        },
+        nets={"p": ["pump.port", "line.port", "hole.a"], "t": ["hole.b", "tank.port"]},
+        fluid=oil, simulation={"stop": "200 ms"},
+    )  # fmt: skip
+    found = examine(bench)
+    assert found.instants[0].fastest > 100 * found.instants[-1].fastest
+    assert not found.stiff
+    steps = bench.simulate(solver="dopri").trajectory.statistics.steps
+    assert found.explicit_steps < 2 * steps

@@ -86,15 +86,15 @@ class Examination:
 
     @property
     def stiffest(self) -> RunModes:
-        """The instant with the fastest mode."""
-        return max(self.instants, key=lambda m: m.fastest)
+        """The instant with the fastest mode; the start lasts too short to count where there are others."""
+        return max(self.instants[1:] or self.instants, key=lambda m: m.fastest)
 
     @property
     def explicit_steps(self) -> float:
-        """Steps that stability alone would ask of an explicit method."""
+        """Steps that stability alone would ask of an explicit method: each instant stands for the time before it."""
         times = np.array([m.time for m in self.instants])
         speed = np.array([m.fastest for m in self.instants])
-        over = np.trapezoid(speed, times) if times.size > 1 else speed[0] * self.span
+        over = np.diff(times) @ speed[1:] if times.size > 1 else speed[0] * self.span
         return float(over / STABLE)
 
     @property
@@ -222,7 +222,7 @@ def _on_stiffness(found: Examination) -> list[str]:
     steps = found.result.trajectory.statistics.steps
     if not found.stiffest.fastest:
         return []
-    fastest = found.stiffest.mode(int(found.stiffest.by_speed[0]))
+    fastest = found.stiffest.mode(int(found.stiffest.limiting[0]))
     who = next(iter(fastest.parts))
     if found.stiff:
         return [

@@ -24,6 +24,8 @@ CELLS = "cells"
 """Its number N, which is always written."""
 TERMS, MORE_TERMS = "friction_terms", (10, 4)
 """Terms of a line's frequency-dependent friction that are tried if none is not enough."""
+STARTS = ("start_pressure", "start_flow")
+"""Fields of its pressure at a and of its flow at the start."""
 MOST_STATES = 800
 """Of a line that is tried."""
 
@@ -57,7 +59,7 @@ def _distributed(
     found: tuple[str, int] | None = None
     states = MOST_STATES
     for terms in (0, *MORE_TERMS):
-        make, each = _cells_of(form, library, terms), 2 + terms
+        make, each = _cells_of(form, library, terms, ends), 2 + terms
         if make is None:
             continue
 
@@ -98,13 +100,14 @@ def _finer(
 
 
 def _written(line: Component) -> str:
-    """A line as it is written in a circuit; what has its default is left out, and what only begins the run."""
+    """A line as it is written in a circuit; what has its default is left out."""
     said = [f"type: {_family(type(line)).type_name()}"]
     for name, field in type(line).model_fields.items():
         value, quantity = getattr(line, name), field_quantity(field)
-        if value is None or name.startswith("start_") or (value == field.default and name != CELLS):
+        if value is None or (value == field.default and name != CELLS):
             continue
-        shown = value if quantity is None else quantity.show(float(value), next(iter(quantity.units)))
+        digits = 3 if name in STARTS else 6
+        shown = value if quantity is None else quantity.show(float(value), next(iter(quantity.units)), digits)
         said.append(f"{name}: {shown}")
     return f"{{{', '.join(said)}}}"
 
@@ -126,8 +129,11 @@ def _fewest(model: Callable[[int], Array | None], first: int, most: int, exact: 
     return high
 
 
-def _cells_of(form: Component, library: Library, terms: int) -> Callable[[int], Component] | None:
-    """Makes the library's distributed line of n cells in place of a line, its ends as the line's; None without one."""
+def _cells_of(form: Component, library: Library, terms: int, ends: Ends) -> Callable[[int], Component] | None:
+    """Makes the library's distributed line of n cells in place of a line, its ends as the line's; None without one.
+
+    It starts from the means of the run, as the line it stands for may start from states that it does not have.
+    """
     cls = library.components.get(INSTEAD)
     if cls is None:
         return None
@@ -136,6 +142,7 @@ def _cells_of(form: Component, library: Library, terms: int) -> Callable[[int], 
     if not forms or CELLS not in cls.model_fields:
         return None
     given = {n: getattr(form, n) for n in cls.model_fields if n in type(form).model_fields}
+    given |= {n: v for n, v in zip(STARTS, (ends.p_a, ends.q), strict=True) if n in cls.model_fields}
     if terms:
         if TERMS not in cls.model_fields:
             return None

@@ -54,9 +54,14 @@ class RunModes:
         return float(size.max() / size.min()) if size.size else 1.0
 
     @property
+    def limiting(self) -> Array:
+        """Places of the modes that limit the steps of an explicit method, by falling |s|; what grows does not."""
+        return np.asarray([k for k in self.by_speed if self.eigenvalues[k].real <= 0], dtype=int)
+
+    @property
     def fastest(self) -> float:
-        """Largest |s| [1/s]; 0 without modes."""
-        return float(np.abs(self.eigenvalues).max(initial=0.0))
+        """Largest |s| of those [1/s]; 0 without."""
+        return float(np.abs(self.eigenvalues[self.limiting]).max(initial=0.0))
 
     def mode(self, k: int) -> Mode:
         """The mode at place k."""
