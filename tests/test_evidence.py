@@ -33,6 +33,11 @@ def test_every_type_has_evidence() -> None:
     known = set(listed(installed()))
     assert not known - shown, f"no figure for {sorted(known - shown)}"
     assert not shown - known, f"figures for what the library does not have: {sorted(shown - known)}"
+    for page, said in (
+        ("README.md", f"each of the {len(known)} parts"),
+        ("CHANGELOG.md", f"A library of {len(known)} "),
+    ):
+        assert said in (ROOT / page).read_text(encoding="utf-8")
 
 
 def test_the_pages_of_the_components_are_those_of_this_code() -> None:
