@@ -36,7 +36,7 @@ def plot_series(result: Result, names: Sequence[str], path: Path | None = None, 
     """Draw variables over time, one axis per quantity; save the figure if ``path`` is given."""
     figure = _figure(result, PlotSection(y=list(names) or result.net_pressures(), title=title))
     if path is not None:
-        _save(figure, path)
+        save_figure(figure, path)
     return figure
 
 
@@ -45,7 +45,7 @@ def write_plots(result: Result, base: Path) -> list[Path]:
     paths: list[Path] = []
     for number, section in enumerate(_sections(result), start=1):
         paths.append(base.with_name(f"{base.name}-{number}.png"))
-        _save(_figure(result, section), paths[-1])
+        save_figure(_figure(result, section), paths[-1])
     return paths
 
 
@@ -86,12 +86,13 @@ def _sections(result: Result) -> Iterable[PlotSection]:
     ]
 
 
-def _save(figure: Figure, path: Path) -> None:
+def save_figure(figure: Figure, path: Path) -> None:
+    """Write a picture in the house's style, the same bytes each time; raises :class:`InputError` where it cannot be."""
     import matplotlib as mpl
 
     try:
-        with mpl.rc_context(STYLE):
-            figure.savefig(path)
+        with mpl.rc_context({**STYLE, "svg.hashsalt": "crescentlab"}):
+            figure.savefig(path, metadata={"Date": None} if path.suffix == ".svg" else None)
     except (OSError, ValueError) as error:
         raise InputError(f"{path}: cannot be written ({getattr(error, 'strerror', None) or error})") from None
 

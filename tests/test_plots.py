@@ -76,7 +76,7 @@ def test_result_plot_saves_and_uses_no_window(tmp_path: Path) -> None:
 
 def test_the_plots_of_a_circuit(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     drawn: list[Any] = []
-    monkeypatch.setattr("crescentlab.plotting._save", lambda figure, path: drawn.append(figure))
+    monkeypatch.setattr("crescentlab.plotting.save_figure", lambda figure, path: drawn.append(figure))
     result = circuit(tmp_path, CIRCUIT + PLOTS).simulate()
     paths = write_plots(result, tmp_path / "filling")
     assert [path.name for path in paths] == ["filling-1.png", "filling-2.png", "filling-3.png"]

@@ -10,8 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from scipy.stats import probplot
 
-from crescentlab.errors import InputError
-from crescentlab.plotting import COLOURS, STYLE
+from crescentlab.plotting import COLOURS, STYLE, save_figure
 from crescentlab.studies.fit_problem import TIME, Measured
 from crescentlab.studies.fit_report import Fit
 from crescentlab.units import normalise
@@ -29,8 +28,6 @@ Array = np.ndarray
 
 def write_pictures(found: Fit, base: Path) -> list[Path]:
     """Write ``<base>-<column>.png`` for each measured column."""
-    import matplotlib as mpl
-
     paths: list[Path] = []
     for number, each in enumerate(found.problem.measured):
         of = (found.problem.data.column == number) & found.fitted.active
@@ -38,11 +35,7 @@ def write_pictures(found: Fit, base: Path) -> list[Path]:
             continue
         column = re.sub(r"[^\w-]+", "_", each.name)
         paths.append(base.with_name(f"{base.name}-{column}.png"))
-        try:
-            with mpl.rc_context(STYLE):
-                picture(found, number).savefig(paths[-1])
-        except (OSError, ValueError) as error:
-            raise InputError(f"{paths[-1]}: cannot be written ({getattr(error, 'strerror', None) or error})") from None
+        save_figure(picture(found, number), paths[-1])
     return paths
 
 

@@ -9,8 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from crescentlab.errors import InputError
-from crescentlab.plotting import STYLE
+from crescentlab.plotting import save_figure
 from crescentlab.studies.drawing import Column, bar_chart, curves, distributions, scatter_matrix
 from crescentlab.studies.planning import Planned
 from crescentlab.studies.points import DONE
@@ -40,7 +39,7 @@ def write_pictures(planned: Planned, rows: Sequence[Row], folder: Path) -> list[
         figure = _DRAWN[kind](planned, rows, plot)
         for suffix in FORMATS:
             written.append(folder / f"picture-{number}-{kind}{suffix}")
-            _save(figure, written[-1])
+            save_figure(figure, written[-1])
     return written
 
 
@@ -121,13 +120,3 @@ def _distribution(planned: Planned, rows: Sequence[Row], plot: PlotSection) -> F
 _DRAWN: dict[str, Callable[[Planned, Sequence[Row], PlotSection], Any]] = {
     "curves": _curves, "tornado": _tornado, "scatter": _scatter, "distribution": _distribution,
 }  # fmt: skip
-
-
-def _save(figure: Figure, path: Path) -> None:
-    import matplotlib as mpl
-
-    try:
-        with mpl.rc_context({**STYLE, "svg.hashsalt": "crescentlab"}):
-            figure.savefig(path, metadata={"Date": None} if path.suffix == ".svg" else None)
-    except OSError as error:
-        raise InputError(f"{path}: cannot be written ({error.strerror})") from None

@@ -13,8 +13,7 @@ from crescentlab.analysis.linear.files import UNITS, phase, ratio_unit
 from crescentlab.analysis.linear.frequency import Responses, Transfer
 from crescentlab.analysis.linear.modes import Mode
 from crescentlab.elaborate import Design
-from crescentlab.errors import InputError
-from crescentlab.plotting import COLOURS, STYLE
+from crescentlab.plotting import COLOURS, STYLE, save_figure
 from crescentlab.units import DISPLAY, Quantity
 
 Array = np.ndarray
@@ -46,21 +45,11 @@ def write_frequency_plots(found: Responses, title: str, base: Path, unit: str) -
         if transfers:
             heading = "Impedance" if name == "impedance" else "Frequency response"
             written.append(base.with_name(f"{base.name}-{name}.png"))
-            _save(bode_figure(found, transfers, f"{title}: {heading.lower()}", unit), written[-1])
+            save_figure(bode_figure(found, transfers, f"{title}: {heading.lower()}", unit), written[-1])
     if found.modes:
         written.append(base.with_name(f"{base.name}-poles.png"))
-        _save(pole_figure(found.modes, f"{title}: poles", unit), written[-1])
+        save_figure(pole_figure(found.modes, f"{title}: poles", unit), written[-1])
     return written
-
-
-def _save(figure: Any, path: Path) -> None:
-    import matplotlib as mpl
-
-    try:
-        with mpl.rc_context(STYLE):
-            figure.savefig(path)
-    except (OSError, ValueError) as error:
-        raise InputError(f"{path}: cannot be written ({getattr(error, 'strerror', None) or error})") from None
 
 
 def bode_figure(found: Responses, transfers: Sequence[Transfer], title: str, unit: str) -> Any:

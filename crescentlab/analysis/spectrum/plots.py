@@ -10,12 +10,11 @@ import numpy as np
 
 from crescentlab.analysis.spectrum.lines import Spectrum
 from crescentlab.analysis.spectrum.waterfall import Waterfall
-from crescentlab.errors import InputError
-from crescentlab.plotting import COLOURS, LINES, STYLE
+from crescentlab.plotting import COLOURS, LINES, STYLE, save_figure
 from crescentlab.units import Quantity, normalise
 
 if TYPE_CHECKING:
-    from matplotlib.figure import Figure
+    pass
 
 NAMED = 5
 """Lines of a spectrum that are named, and orders of a waterfall that are drawn by themselves."""
@@ -52,7 +51,7 @@ def plot_spectra(
             above = stack[0].secondary_xaxis("top", functions=(lambda f: f / turns, lambda n: n * turns))
             above.set_xlabel("order of the shaft")
         figure.align_ylabels()
-    _save(figure, path)
+    save_figure(figure, path)
 
 
 def _last_shown(spectrum: Spectrum) -> float:
@@ -103,7 +102,7 @@ def plot_waterfall(waterfall: Waterfall, unit: str, speed: tuple[Quantity, str],
         below.set_ylim(largest * 10**-DECADES, 1.5 * largest)
         below.margins(x=0)
         below.legend(loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=NAMED, borderpad=0.1, handlelength=1.5)
-    _save(figure, path)
+    save_figure(figure, path)
 
 
 def _running(waterfall: Waterfall, speed: tuple[Quantity, str]) -> tuple[np.ndarray, str]:
@@ -122,13 +121,3 @@ def factor(quantity: Quantity, unit: str) -> float:
 
 def _label(text: str, unit: str) -> str:
     return text if unit in ("1", "") else f"{text} [{unit}]"
-
-
-def _save(figure: Figure, path: Path) -> None:
-    import matplotlib as mpl
-
-    try:
-        with mpl.rc_context(STYLE):
-            figure.savefig(path)
-    except (OSError, ValueError) as error:
-        raise InputError(f"{path}: cannot be written ({getattr(error, 'strerror', None) or error})") from None
