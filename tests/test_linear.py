@@ -596,3 +596,22 @@ def test_wrong_options_are_one_sentence(options: list[str], said: str, capsys: p
     error = capsys.readouterr().err
     assert said in error
     assert "Traceback" not in error
+
+
+@pytest.mark.parametrize(("supply", "smooth"), [("20 L/min", True), ("30 L/min", False), ("30.01 L/min", False)])
+def test_a_parameter_at_a_kink_of_its_expression_is_no_input(supply: str, smooth: bool) -> None:
+    """flow = min(supply, 30 L/min): slope 1 below, 0 above, neither at it nor within the step of the differences."""
+    bench = circuit(
+        parameters={"supply": supply},
+        components={
+            "pump": {"type": "flow_source", "flow": "= min(supply, 30 L/min)"},
+            "line": {"type": "capacity", "volume": "70 cm^3", "start": {"p": "5 bar"}},
+            "hole": {"type": "orifice", "area": "10 mm^2"}, "tank": {"type": "tank"},
+        },
+        nets={"p": ["pump.port", "line.port", "hole.a"], "t": ["hole.b", "tank.port"]}, fluid=OIL,
+    )  # fmt: skip
+    if smooth:
+        assert linearize(bench, inputs=["supply"], outputs=["line.p"]).B.any()
+    else:
+        with pytest.raises(InputError, match="input supply: at this value an expression of it has a kink or jumps"):
+            linearize(bench, inputs=["supply"], outputs=["line.p"])

@@ -28,6 +28,8 @@ Array = np.ndarray
 
 STEP = 1e-3
 """Relative step of the differences by which a circuit parameter's way into the components' parameters is found."""
+KINK = 0.02
+"""Relative change of the slope over such a step that a smooth expression does not show."""
 
 
 class _Probe(Component):
@@ -244,8 +246,12 @@ class Inputs:
             probes = {n: i for n, i in self.design.instances.items() if n not in design.instances}
             return system.values(replace(design, instances={**design.instances, **probes})).p
 
-        slope = (8 * (moved(1) - moved(-1)) - (moved(2) - moved(-2))) / (12 * step)
+        near, far = moved(1) - moved(-1), moved(2) - moved(-2)
+        slope = (8 * near - far) / (12 * step)
         size = np.abs(moved(0)) / step
+        bends = np.abs(moved(1) + moved(-1) - 2 * moved(0)) / step, np.abs(far / (4 * step) - slope)
+        if np.any(np.maximum(*bends) > KINK * np.abs(slope) + 1e-12 * size):
+            raise InputError(f"input {name}: at this value an expression of it has a kink or jumps; move it a little")
         places = np.flatnonzero(np.abs(slope) > 1e-12 * size)
         if not places.size:
             raise InputError(f"input {name}: no number inside the equations depends on it; it changes nothing here")
