@@ -1,9 +1,11 @@
 """Ends of a hydraulic circuit: tanks, vents, sources of pressure and flow, and plugs. They store nothing."""
 
+from typing import ClassVar
+
 from pydantic import Field
 
 from crescentlab.component import Component, Equations
-from crescentlab.domain import gives_pressure, observable, state, takes_pressure, takes_signal
+from crescentlab.domain import gives_pressure, observable, state, supplies, takes_pressure, takes_signal
 from crescentlab.maths import Expr
 from crescentlab.units import Flow, Pressure, Volume
 
@@ -20,6 +22,7 @@ class Tank(Component):
     pressure: Pressure = Field(default=0.0, description="pressure above the atmosphere")
 
     port = gives_pressure("the reservoir")
+    supply = supplies()
 
     def equations(self) -> Equations:
         return {"p_port": self.pressure}
@@ -38,6 +41,7 @@ class AtmosphericVent(Component):
     port = gives_pressure("the atmosphere")
     lost = state(Volume, "volume that has left", start=0.0, nominal=1e-6, counts=True)
     outflow = observable(Flow, "flow into the atmosphere")
+    supply = supplies()
 
     def equations(self, q_port: Expr) -> Equations:
         return {"p_port": 0.0, "der_lost": q_port, "outflow": q_port}
@@ -54,6 +58,7 @@ class PressureSource(Component):
     pressure: Pressure = Field(description="pressure held")
 
     port = gives_pressure("the source")
+    supply = supplies()
 
     def equations(self) -> Equations:
         return {"p_port": self.pressure}
@@ -69,6 +74,7 @@ class SignalPressureSource(Component):
 
     port = gives_pressure("the source")
     pressure = takes_signal(Pressure, "pressure held")
+    supply = supplies()
 
     def equations(self, pressure: Expr) -> Equations:
         return {"p_port": pressure}
@@ -86,6 +92,7 @@ class FlowSource(Component):
     flow: Flow = Field(description="flow out of the source")
 
     port = takes_pressure("the outlet")
+    supply = supplies()
 
     def equations(self) -> Equations:
         return {"q_port": -self.flow}
@@ -102,6 +109,7 @@ class SignalFlowSource(Component):
 
     port = takes_pressure("the outlet")
     flow = takes_signal(Flow, "flow out of the source")
+    supply = supplies()
 
     def equations(self, flow: Expr) -> Equations:
         return {"q_port": -flow}
@@ -114,6 +122,8 @@ class Plug(Component):
 
     q [m^3/s]. Not needed where a net has other ports that take its pressure. Source: boundary condition.
     """
+
+    lossless: ClassVar[bool] = True
 
     port = takes_pressure("what is closed")
 

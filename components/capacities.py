@@ -6,7 +6,7 @@ from pydantic import Field
 
 from crescentlab import units
 from crescentlab.component import Component, Equations
-from crescentlab.domain import gives_pressure, state, stores, takes_chamber
+from crescentlab.domain import gives_pressure, state, stores, stores_energy, takes_chamber
 from crescentlab.fluid import Fluid
 from crescentlab.maths import Expr, pi
 from crescentlab.tables import Curve, CurveOf
@@ -28,6 +28,7 @@ class Capacity(Component):
     port = gives_pressure("the volume")
     p = state(Pressure, "pressure", start=0.0, nominal=1e5)
     content = stores()
+    stored_energy = stores_energy()
 
     def equations(self, p: Expr, q_port: Expr, fluid: Fluid) -> Equations:
         swell = fluid.rho_0 / fluid.density(p)
@@ -35,6 +36,7 @@ class Capacity(Component):
             "p_port": p,
             "der_p": fluid.bulk_modulus(p) / self.volume * swell * q_port,
             "content": self.volume / swell,
+            "stored_energy": self.volume * fluid.energy_density(p),
         }
 
 
@@ -52,6 +54,7 @@ class VariableCapacity(Component):
     chamber = takes_chamber("what shapes the volume")
     p = state(Pressure, "pressure", start=0.0, nominal=1e5)
     content = stores()
+    stored_energy = stores_energy()
 
     def equations(self, p: Expr, q_port: Expr, V_chamber: Expr, dV_chamber: Expr, fluid: Fluid) -> Equations:
         swell = fluid.rho_0 / fluid.density(p)
@@ -60,6 +63,7 @@ class VariableCapacity(Component):
             "p_chamber": p,
             "der_p": fluid.bulk_modulus(p) / V_chamber * (swell * q_port - dV_chamber),
             "content": V_chamber / swell,
+            "stored_energy": V_chamber * fluid.energy_density(p),
         }
 
 
@@ -86,6 +90,7 @@ class CompliantCapacity(Component):
     chamber = takes_chamber("what shapes the volume of the rigid walls")
     p = state(Pressure, "pressure", start=0.0, nominal=1e5)
     content = stores()
+    stored_energy = stores_energy()
 
     def equations(self, p: Expr, q_port: Expr, V_chamber: Expr, dV_chamber: Expr, fluid: Fluid) -> Equations:
         swell = fluid.rho_0 / fluid.density(p)
@@ -96,6 +101,7 @@ class CompliantCapacity(Component):
             "p_chamber": p,
             "der_p": (swell * q_port - dV_chamber) / (volume / fluid.bulk_modulus(p) + compliance),
             "content": volume / swell,
+            "stored_energy": volume * fluid.energy_density(p) + self.wall_area * self.deflection.work(p),
         }
 
 
@@ -128,6 +134,7 @@ class ElasticCapacity(Component):
     port = gives_pressure("the volume")
     p = state(Pressure, "pressure", start=0.0, nominal=1e5)
     content = stores()
+    stored_energy = stores_energy()
 
     def equations(self, p: Expr, q_port: Expr, fluid: Fluid) -> Equations:
         volume = pi / 4 * self.diameter * self.diameter * self.length
@@ -138,6 +145,7 @@ class ElasticCapacity(Component):
             "p_port": p,
             "der_p": swell * q_port / (grown / fluid.bulk_modulus(p) + compliance),
             "content": grown / swell,
+            "stored_energy": grown * fluid.energy_density(p) + compliance * p * p / 2,
         }
 
     def _wall(self) -> Any:

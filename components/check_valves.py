@@ -3,7 +3,7 @@
 from pydantic import Field
 
 from crescentlab.component import Component, Equations
-from crescentlab.domain import observable, reads_pressure, takes_pressure
+from crescentlab.domain import dissipates, observable, reads_pressure, takes_pressure
 from crescentlab.fluid import Fluid
 from crescentlab.maths import Expr, maximum, minimum
 from crescentlab.units import Area, Flow, FlowConductance, Length, Pressure, Ratio
@@ -38,6 +38,7 @@ class CheckValve(Component):
     b = takes_pressure("outlet")
     q = observable(Flow, "flow from a to b")
     lift = observable(Ratio, "share of the full opening")
+    loss = dissipates()
 
     def equations(self, p_a: Expr, p_b: Expr, fluid: Fluid) -> Equations:
         lift = minimum(maximum((p_a - p_b - self.cracking_pressure) / self.opening_range, 0.0), 1.0)
@@ -63,6 +64,7 @@ class IdealCheckValve(Component):
     a = takes_pressure("inlet")
     b = takes_pressure("outlet")
     q = observable(Flow, "flow from a to b")
+    loss = dissipates()
 
     def equations(self, p_a: Expr, p_b: Expr) -> Equations:
         q = self.conductance * maximum(p_a - p_b, 0.0)
@@ -92,6 +94,7 @@ class PilotOperatedCheckValve(Metering, Component):
     pilot = reads_pressure("pilot port X")
     q = observable(Flow, "flow from a to b")
     lift = observable(Ratio, "share of the full opening")
+    loss = dissipates()
 
     def equations(self, p_a: Expr, p_b: Expr, p_pilot: Expr, fluid: Fluid) -> Equations:
         opens = p_a - p_b + self.pilot_ratio * (p_pilot - p_a)

@@ -1,6 +1,6 @@
 """Parts between a rotating shaft and a motion along a line: cranks, eccentrics, swash plates, racks. All ideal."""
 
-from typing import Any, Self
+from typing import Any, ClassVar, Self
 
 from pydantic import Field, model_validator
 
@@ -29,6 +29,8 @@ class Crank(Component):
     `start_angle` [rad] of the shaft where x = 0. No power is lost. Not for the masses of rod and piston, nor for an
     offset cylinder. Source: geometry; Dubbel, Taschenbuch fuer den Maschinenbau, section P 1 (crank mechanism).
     """
+
+    lossless: ClassVar[bool] = True
 
     radius: Length = Field(gt=0, description="radius of the crank")
     rod_length: Length = Field(gt=0, description="length of the connecting rod, more than the radius")
@@ -67,6 +69,8 @@ class Eccentric(Component):
     Hydrostatic Pumps and Motors (2001), radial piston machines.
     """
 
+    lossless: ClassVar[bool] = True
+
     eccentricity: Length = Field(gt=0, description="half the stroke")
     start_angle: Angle = Field(default=0.0, description="angle of the shaft where x = 0")
 
@@ -92,6 +96,8 @@ class SwashPlate(Component):
     Pumps and Motors (2001), kinematics of swash plate machines.
     """
 
+    lossless: ClassVar[bool] = True
+
     pitch_radius: Length = Field(gt=0, description="radius of the circle on which the pistons lie")
     swash_angle: Angle = Field(gt=0, lt=pi / 2, description="inclination of the plate")
     start_angle: Angle = Field(default=0.0, description="angle of the barrel where x = 0")
@@ -112,6 +118,8 @@ class RackAndPinion(Component):
     x [m] of the rack, 0 at the angle 0; \varphi [rad], \omega [rad/s] of the shaft; f, T [N, N m] on the pinion; R =
     `radius` [m], for a screw of lead h it is h/(2 \pi). No power is lost. Not for play. Source: rolling.
     """
+
+    lossless: ClassVar[bool] = True
 
     radius: Length = Field(gt=0, description="radius of the pinion's pitch circle")
 

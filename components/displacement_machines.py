@@ -5,7 +5,7 @@ from typing import Any
 from pydantic import BaseModel, Field
 
 from crescentlab.component import Component, Equations
-from crescentlab.domain import observable, takes_pressure, takes_rotation, takes_signal
+from crescentlab.domain import dissipates, observable, takes_pressure, takes_rotation, takes_signal
 from crescentlab.fluid import Fluid
 from crescentlab.maths import Expr, fabs, maximum, minimum, tanh
 from crescentlab.units import Displacement, Flow, Power, Ratio, Speed, Torque
@@ -31,14 +31,15 @@ class _Rated(BaseModel):
         torque = setting * size * rise + drag + friction * tanh(omega / self.creep_speed)
         volume_flow = setting * size * omega - slip
         q = fluid.density(mean) / fluid.rho_0 * volume_flow
+        power = fluid.rho_0 * q * (fluid.enthalpy(p_outlet) - fluid.enthalpy(p_inlet))
         return {
             "q_inlet": q,
             "q_outlet": -q,
             "torque_shaft": torque,
             "q": q,
             "torque": torque,
-            "hydraulic_power": rise * volume_flow,
-            "loss": torque * omega - rise * volume_flow,
+            "hydraulic_power": power,
+            "loss": torque * omega - power,
         }
 
 
@@ -53,7 +54,7 @@ class FixedDisplacementPump(_Rated, Component):
     [Pa, gauge]; C_s = `leakage_coefficient`, C_d = `drag_coefficient`, C_f = `friction_coefficient` [-]; T_c =
     `friction_torque` [N m]; \omega_t = `creep_speed` [rad/s]; \mu [Pa s], \rho [kg/m^3] at the mean pressure: there D
     is measured, so that the shaft's work without losses is that of compressing and moving the oil, to (\Delta
-    p/\beta)^2/24. The law holds in all four quadrants. Not for ripple (`swash_plate_barrel`, `crescent_gears`), a
+    p/\beta)^2/24 of it, which is then in the loss. The law holds in all four quadrants. Not for ripple (`swash_plate_barrel`, `crescent_gears`), a
     starved inlet, or leakage to a case: join a `laminar_gap` from the outlet to the case. Source: W. E. Wilson,
     Positive-Displacement Pumps and Fluid Motors (1950); H. E. Merritt, Hydraulic Control Systems (1967), chapter 4.
     """
@@ -64,7 +65,7 @@ class FixedDisplacementPump(_Rated, Component):
     q = observable(Flow, "flow from inlet to outlet")
     torque = observable(Torque, "torque of the shaft on the machine, positive while pumping")
     hydraulic_power = observable(Power, "power given to the oil, negative while motoring")
-    loss = observable(Power, "power turned into heat")
+    loss = dissipates()
 
     def equations(self, p_inlet: Expr, p_outlet: Expr, omega_shaft: Expr, fluid: Fluid) -> Equations:
         return self._law(1.0, p_inlet, p_outlet, omega_shaft, fluid)
@@ -105,7 +106,7 @@ class VariableDisplacementPump(_Rated, Component):
     q = observable(Flow, "flow from inlet to outlet")
     torque = observable(Torque, "torque of the shaft on the machine, positive while pumping")
     hydraulic_power = observable(Power, "power given to the oil, negative while motoring")
-    loss = observable(Power, "power turned into heat")
+    loss = dissipates()
 
     def equations(self, p_inlet: Expr, p_outlet: Expr, omega_shaft: Expr, setting: Expr, fluid: Fluid) -> Equations:
         return self._law(minimum(maximum(setting, -1.0), 1.0), p_inlet, p_outlet, omega_shaft, fluid)

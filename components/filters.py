@@ -3,7 +3,7 @@
 from pydantic import Field
 
 from crescentlab.component import Component, Equations
-from crescentlab.domain import observable, takes_pressure
+from crescentlab.domain import dissipates, observable, takes_pressure
 from crescentlab.fluid import Fluid
 from crescentlab.maths import Expr, fabs, sqrt
 from crescentlab.units import Density, Flow, FlowResistance, KinematicViscosity, QuadraticResistance, Ratio
@@ -34,6 +34,7 @@ class Filter(Component):
     a = takes_pressure("dirty side")
     b = takes_pressure("clean side")
     q = observable(Flow, "flow from a to b")
+    loss = dissipates()
 
     def equations(self, p_a: Expr, p_b: Expr, fluid: Fluid) -> Equations:
         drop, mean = p_a - p_b, (p_a + p_b) / 2

@@ -8,7 +8,7 @@ from typing import Any, Self
 from pydantic import Field, model_validator
 
 from crescentlab.component import Component, Equations
-from crescentlab.domain import observable, takes_pressure
+from crescentlab.domain import dissipates, observable, takes_pressure
 from crescentlab.fluid import Fluid
 from crescentlab.maths import Expr, pi, sin, table, where
 from crescentlab.units import Angle, Flow, Length, Ratio
@@ -26,9 +26,9 @@ class LocalLoss(Component):
 
     p [Pa] gauge, total; d = `diameter` [m] to which \zeta = `loss_coefficient` [-] refers; from b to a
     `loss_coefficient_back` counts, by default the same; K_1 = `laminar_coefficient` [-]; n = `parallel` [-]; \rho
-    [kg/m^3], \nu [m^2/s] at the mean pressure. Some pairs K_1, \zeta by Hooper, whose \zeta of small bores is larger by
-    the factor 1 + 25.4 mm/d: pipe entry 160, 0.5; exit 0, 1; ball or gate valve 300, 0.1; globe valve 1500, 4;
-    lift check valve 2000, 10; tee, branch 800, 0.8. Not for losses that stand so close that they disturb each other.
+    [kg/m^3], \nu [m^2/s] at the mean pressure. Some pairs K_1, \zeta by Hooper: pipe entry 160, 0.5; ball or gate valve
+    300, 0.1; globe valve 1500, 4; lift check valve 2000, 10; tee, branch 800, 0.8; in small bores \zeta is larger, by
+    the factor 1 + 25.4 mm/d, but not that of entries. Not for losses that stand so close that they disturb each other.
     Source: W. B. Hooper, Chem. Eng. 88 (1981) 17, 96-100; I. E. Idelchik, Handbook of Hydraulic Resistance.
     """
 
@@ -41,6 +41,7 @@ class LocalLoss(Component):
     a = takes_pressure("first end")
     b = takes_pressure("second end")
     q = observable(Flow, "flow from a to b")
+    loss = dissipates()
 
     def equations(self, p_a: Expr, p_b: Expr, fluid: Fluid) -> Equations:
         loss: Any = self.loss_coefficient
@@ -66,7 +67,7 @@ def bend_loss(curvature: Any, angle: Any) -> Any:
               B_1 = 0.21\, (R/d)^{-1/2} \ (R \ge d)
 
     R/d = `curvature` [-], radius of the axis over the bore; \delta = `angle` [rad]; A_1 = 0.9 \sin\delta up to 70
-    degrees, 1 at 90, 0.7 + 0.35 \delta/90 from 100 degrees on, straight lines between.
+    degrees, 1 at 90, 0.7 + 0.35 \delta/90 from 100 degrees on, straight lines between. For Re from 3 10^5 on.
     Source: I. E. Idelchik, Handbook of Hydraulic Resistance, diagram 6-1.
     """
     turned = where(angle < SHARP_TURN, 0.9 * sin(angle), table(angle, TURNS, TURN_FACTORS, flag_knots=False))
@@ -81,8 +82,9 @@ class Bend(Component):
 
     p [Pa] gauge, total; d = `diameter`, R = `radius` of the axis [m]; \delta = `angle` [rad]; A_1 [-] is 0.9 sin \delta
     up to 70 degrees, 1 at 90, 0.7 + 0.35 \delta/90 from 100 degrees on; f [-] Darcy factor of Churchill with
-    `roughness`; v [m/s], \rho [kg/m^3], \nu [m^2/s] as in `pipe_resistance`. For R/d from 0.5 on and straight pipe of
-    ten diameters behind; in laminar flow the part of the curvature is kept. Not for square corners (`elbow`).
+    `roughness`; v [m/s], \rho [kg/m^3], \nu [m^2/s] as in `pipe_resistance`. For R/d from 0.5 on, ten diameters of
+    straight pipe ahead of it, and Re from 3 10^5 on: left out is that the part of the curvature grows below, by the
+    diagram to twice A_1 B_1 at Re = 10^4, and by 600/Re to 6000/Re in laminar flow. Not for square corners (`elbow`).
     Source: I. E. Idelchik, Handbook of Hydraulic Resistance, diagram 6-1; S. W. Churchill (1977).
     """
 
@@ -94,6 +96,7 @@ class Bend(Component):
     a = takes_pressure("first end")
     b = takes_pressure("second end")
     q = observable(Flow, "flow from a to b")
+    loss = dissipates()
 
     @model_validator(mode="after")
     def _can_be_bent(self) -> Self:
@@ -118,8 +121,10 @@ class Elbow(Component):
 
     p [Pa] gauge, total; d = `diameter` [m]; \delta = `angle` [rad]; K_1 = `laminar_coefficient` [-], by default that of
     90 degrees; v [m/s] mean velocity in the bore; Re = |v| d/\nu [-]; \rho [kg/m^3], \nu [m^2/s] at the mean pressure.
-    Not for corners closer to each other than some diameters. Source: J. Weisbach's formula of elbows; K_1 of a mitred
-    corner: W. B. Hooper, Chem. Eng. 88 (1981) 17, 96-100.
+    Later sources give from 0.8 to 1.2 at 90 degrees; Idelchik takes 1.2 times this formula there and 2.5 times at 20
+    degrees. Not for corners closer to each other than some diameters. Source: J. Weisbach's formula of elbows, in I. E.
+    Idelchik, Handbook of Hydraulic Resistance, chapter 6; K_1 of a mitred corner: W. B. Hooper, Chem. Eng. 88 (1981)
+    17, 96-100.
     """
 
     diameter: Length = Field(gt=0, description="inner diameter")
@@ -131,6 +136,7 @@ class Elbow(Component):
     a = takes_pressure("first end")
     b = takes_pressure("second end")
     q = observable(Flow, "flow from a to b")
+    loss = dissipates()
 
     def equations(self, p_a: Expr, p_b: Expr, fluid: Fluid) -> Equations:
         squared = sin(self.angle / 2) ** 2
@@ -148,8 +154,9 @@ class SuddenExpansion(Component):
 
     p [Pa] gauge, total: what the expansion wins back from the dynamic head is not in the drop; v [m/s], Re [-] in the
     narrow section A_1 of `narrow_diameter`; A_2 [m^2] of `wide_diameter`; K_1 = `laminar_coefficient` [-]; \rho
-    [kg/m^3], \nu [m^2/s] at the mean pressure. Not for tapered pipes. Source: Borda-Carnot, from the balance of
-    momentum; contraction, and K_1 = 30 below Re = 10: I. E. Idelchik, Handbook of Hydraulic Resistance,
+    [kg/m^3], \nu [m^2/s] at the mean pressure. From Re = 10 to some 10^4 the diagrams' tables have more: a contraction
+    up to 1.7 times, an expansion up to 3 times at Re = 1000. Not for tapered pipes. Source: Borda-Carnot, from the
+    balance of momentum; contraction, and K_1 = 30 below Re = 10: I. E. Idelchik, Handbook of Hydraulic Resistance,
     diagrams 4-1, 4-9 and 4-10.
     """
 
@@ -160,6 +167,7 @@ class SuddenExpansion(Component):
     a = takes_pressure("narrow end")
     b = takes_pressure("wide end")
     q = observable(Flow, "flow from a to b")
+    loss = dissipates()
 
     @model_validator(mode="after")
     def _widens(self) -> Self:

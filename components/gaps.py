@@ -5,10 +5,10 @@ from typing import Self
 from pydantic import Field, model_validator
 
 from crescentlab.component import Component, Equations
-from crescentlab.domain import observable, takes_motion, takes_pressure, takes_rotation, takes_signal
+from crescentlab.domain import dissipates, observable, takes_motion, takes_pressure, takes_rotation, takes_signal
 from crescentlab.fluid import Fluid
 from crescentlab.maths import Expr, log, maximum, pi, sqrt
-from crescentlab.units import Angle, Flow, Force, Length, Power, Ratio, Torque
+from crescentlab.units import Angle, Flow, Force, Length, Ratio, Torque
 
 from .flow_laws import annular_flow, drag_flow, radial_flow, slot_flow
 
@@ -33,6 +33,7 @@ class LaminarGap(Component):
     a = takes_pressure("upstream", size="count")
     b = takes_pressure("downstream", size="count")
     q = observable(Flow, "flow from a to b", size="count")
+    loss = dissipates()
 
     def equations(self, p_a: Expr, p_b: Expr, fluid: Fluid) -> Equations:
         q = self.parallel * slot_flow(p_a, p_b, self.width, self.height, self.length, fluid)
@@ -61,6 +62,7 @@ class VariableHeightGap(Component):
     b = takes_pressure("downstream", size="count")
     change = takes_signal(Length, "change of the height, for all gaps")
     q = observable(Flow, "flow from a to b", size="count")
+    loss = dissipates()
 
     def equations(self, p_a: Expr, p_b: Expr, change: Expr, fluid: Fluid) -> Equations:
         height = self.height + self.change_factor * change
@@ -88,6 +90,7 @@ class VariableWidthGap(Component):
     b = takes_pressure("downstream", size="count")
     opening = takes_signal(Ratio, "open share of the width", size="count")
     q = observable(Flow, "flow from a to b", size="count")
+    loss = dissipates()
 
     def equations(self, p_a: Expr, p_b: Expr, opening: Expr, fluid: Fluid) -> Equations:
         width = self.width * maximum(opening, 0.0)
@@ -117,6 +120,7 @@ class AnnularGap(Component):
     a = takes_pressure("upstream", size="count")
     b = takes_pressure("downstream", size="count")
     q = observable(Flow, "flow from a to b", size="count")
+    loss = dissipates()
 
     def equations(self, p_a: Expr, p_b: Expr, fluid: Fluid) -> Equations:
         one = annular_flow(p_a, p_b, self.diameter, self.clearance, self.eccentricity, self.length, fluid)
@@ -135,7 +139,7 @@ class AxialFaceGap(Component):
     `lift` [N] is its force on one face, gauge, over the gap alone: F = (\alpha/2) [r_2^2 p_b - r_1^2 p_a +
     (r_2^2 - r_1^2)(p_a - p_b)/(2 \ln(r_2/r_1))]. Not for tilted faces, turbulent gaps, or the inertia of fast
     radial flow. Source: Poiseuille flow between parallel discs; H. E. Merritt, Hydraulic Control Systems (1967),
-    section 3-2.
+    chapter 3.
     """
 
     inner_diameter: Length = Field(gt=0, description="of the gap, at a")
@@ -148,6 +152,7 @@ class AxialFaceGap(Component):
     b = takes_pressure("outer edge")
     q = observable(Flow, "flow from a to b")
     lift = observable(Force, "pressure force of one gap that pushes its faces apart")
+    loss = dissipates()
 
     @model_validator(mode="after")
     def _has_a_width(self) -> Self:
@@ -191,7 +196,7 @@ class MovingAnnularGap(Component):
     rod = takes_motion("the piston")
     q = observable(Flow, "flow from a to b")
     drag = observable(Force, "force on the piston, positive towards decreasing x")
-    loss = observable(Power, "power turned into heat")
+    loss = dissipates()
 
     def equations(self, p_a: Expr, p_b: Expr, v_rod: Expr, fluid: Fluid) -> Equations:
         drop, around = p_a - p_b, pi * self.diameter
@@ -200,7 +205,8 @@ class MovingAnnularGap(Component):
         narrow = self.clearance * sqrt(1 - self.eccentricity * self.eccentricity)
         shear = fluid.dynamic_viscosity((p_a + p_b) / 2) * self.length * v_rod / narrow
         drag = around * (shear - self.clearance / 2 * drop)
-        return {"q_a": q, "q_b": -q, "f_rod": drag, "q": q, "drag": drag, "loss": q * drop + drag * v_rod}
+        loss = fluid.rho_0 * q * (fluid.enthalpy(p_a) - fluid.enthalpy(p_b)) + drag * v_rod
+        return {"q_a": q, "q_b": -q, "f_rod": drag, "q": q, "drag": drag, "loss": loss}
 
 
 class RotatingAnnularGap(Component):
@@ -226,12 +232,12 @@ class RotatingAnnularGap(Component):
     shaft = takes_rotation("the shaft")
     q = observable(Flow, "flow from a to b")
     torque = observable(Torque, "torque that brakes the shaft, positive against positive speed")
-    loss = observable(Power, "power turned into heat")
+    loss = dissipates()
 
     def equations(self, p_a: Expr, p_b: Expr, omega_shaft: Expr, fluid: Fluid) -> Equations:
         q = annular_flow(p_a, p_b, self.diameter, self.clearance, self.eccentricity, self.length, fluid)
         narrow = self.clearance * sqrt(1 - self.eccentricity * self.eccentricity)
         mu = fluid.dynamic_viscosity((p_a + p_b) / 2)
         torque = pi * mu * self.diameter**3 * self.length / (4 * narrow) * omega_shaft
-        loss = q * (p_a - p_b) + torque * omega_shaft
+        loss = fluid.rho_0 * q * (fluid.enthalpy(p_a) - fluid.enthalpy(p_b)) + torque * omega_shaft
         return {"q_a": q, "q_b": -q, "torque_shaft": torque, "q": q, "torque": torque, "loss": loss}

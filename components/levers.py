@@ -1,5 +1,7 @@
 """Levers: rigid and without mass, they change forces and motions and pass on all power. Small angles only."""
 
+from typing import ClassVar
+
 from pydantic import Field
 
 from crescentlab.component import Component, Equations
@@ -19,6 +21,8 @@ class Lever(Component):
     Not for large angles, nor for a mass on either side of one lever: put a spring between.
     Source: law of the lever (Archimedes).
     """
+
+    lossless: ClassVar[bool] = True
 
     arm_a: Length = Field(gt=0, description="from the pivot to end a")
     arm_b: Length = Field(gt=0, description="from the pivot to end b")
@@ -41,6 +45,8 @@ class FloatingLever(Component):
     outside. No power is lost. Not for large angles.
     Source: balance of forces and moments on a beam without mass.
     """
+
+    lossless: ClassVar[bool] = True
 
     share: Ratio = Field(default=0.5, description="where c lies between a (0) and b (1)")
 

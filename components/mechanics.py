@@ -6,7 +6,17 @@ from pydantic import Field, model_validator
 
 from crescentlab import units
 from crescentlab.component import Component, Equations
-from crescentlab.domain import gives_motion, held, observable, state, takes_motion, takes_signal
+from crescentlab.domain import (
+    dissipates,
+    gives_motion,
+    held,
+    observable,
+    state,
+    stores_energy,
+    supplies,
+    takes_motion,
+    takes_signal,
+)
 from crescentlab.maths import Expr, exp, fabs, maximum, minimum, tanh, when, where
 from crescentlab.units import Damping, Force, Length, Ratio, Stiffness, Velocity
 
@@ -25,9 +35,16 @@ class Mass(Component):
     port = gives_motion("the mass")
     x = state(Length, "position", start=0.0, nominal=1e-3)
     v = state(Velocity, "velocity", start=0.0, nominal=1e-2)
+    kinetic_energy = stores_energy("kinetic energy")
 
     def equations(self, x: Expr, v: Expr, f_port: Expr) -> Equations:
-        return {"x_port": x, "v_port": v, "der_x": v, "der_v": f_port / self.mass}
+        return {
+            "x_port": x,
+            "v_port": v,
+            "der_x": v,
+            "der_v": f_port / self.mass,
+            "kinetic_energy": self.mass * v * v / 2,
+        }
 
 
 class MassWithStops(Component):
@@ -52,6 +69,7 @@ class MassWithStops(Component):
     x = state(Length, "position", start="low", nominal=1e-3)
     v = state(Velocity, "velocity", start=0.0, nominal=1e-2)
     at = held(Ratio, "-1 rests on the low stop, 1 on the high one, 0 free; -2 until the start is looked at", start=-2.0)
+    kinetic_energy = stores_energy("kinetic energy")
 
     @model_validator(mode="after")
     def _stops_in_order(self) -> Self:
@@ -72,6 +90,7 @@ class MassWithStops(Component):
             "v_port": v,
             "der_x": v,
             "der_v": where(free, f_port / self.mass, 0.0),
+            "kinetic_energy": self.mass * v * v / 2,
             "hits_low": when(free & (x < self.low), x=self.low, v=where(fast, rebound, 0.0), at=where(fast, 0.0, -1.0)),
             "hits_high": when(
                 free & (x > self.high), x=self.high, v=where(fast, rebound, 0.0), at=where(fast, 0.0, 1.0)
@@ -106,6 +125,8 @@ class StickSlipMass(Component):
     direction = held(Ratio, "1 slides up, -1 slides down, 0 sticks; 2 until the start is looked at", start=2.0)
     sticking = observable(Ratio, "1 while the mass sticks, 0 while it slides")
     friction = observable(Force, "friction force on the mass")
+    kinetic_energy = stores_energy("kinetic energy")
+    loss = dissipates()
 
     @model_validator(mode="after")
     def _static_is_larger(self) -> Self:
@@ -128,6 +149,8 @@ class StickSlipMass(Component):
             "der_v": where(slides, (f_port - direction * self.coulomb_friction) / self.mass, 0.0),
             "sticking": where(slides, 0.0, 1.0),
             "friction": friction,
+            "kinetic_energy": self.mass * v * v / 2,
+            "loss": -friction * v,
             "stops": when((direction == 1) & (v < 0) | (direction == -1) & (v > 0), v=0.0, direction=onward),
             "breaks_away_up": when(sticks & (f_port > self.static_friction), direction=1.0),
             "breaks_away_down": when(sticks & (f_port < -self.static_friction), direction=-1.0),
@@ -149,10 +172,11 @@ class Spring(Component):
 
     rod = takes_motion("the moving end")
     force = observable(Force, "spring force, positive towards decreasing x")
+    stored_energy = stores_energy("strain energy, 0 at x = 0")
 
     def equations(self, x_rod: Expr) -> Equations:
         force = self.preload + self.stiffness * x_rod
-        return {"f_rod": force, "force": force}
+        return {"f_rod": force, "force": force, "stored_energy": (self.preload + force) / 2 * x_rod}
 
 
 class SpringBetween(Component):
@@ -170,10 +194,12 @@ class SpringBetween(Component):
     a = takes_motion("first end")
     b = takes_motion("second end")
     tension = observable(Force, "spring force, positive in tension")
+    stored_energy = stores_energy("strain energy")
 
     def equations(self, x_a: Expr, x_b: Expr) -> Equations:
-        tension = self.stiffness * (x_b - x_a - self.free_length)
-        return {"f_a": -tension, "f_b": tension, "tension": tension}
+        extension = x_b - x_a - self.free_length
+        tension = self.stiffness * extension
+        return {"f_a": -tension, "f_b": tension, "tension": tension, "stored_energy": tension * extension / 2}
 
 
 class Damper(Component):
@@ -188,6 +214,7 @@ class Damper(Component):
     coefficient: Damping = Field(ge=0, description="force per velocity")
 
     rod = takes_motion("the moving end")
+    loss = dissipates()
 
     def equations(self, v_rod: Expr) -> Equations:
         return {"f_rod": self.coefficient * v_rod}
@@ -207,6 +234,7 @@ class DamperBetween(Component):
     a = takes_motion("first end")
     b = takes_motion("second end")
     tension = observable(Force, "damping force, positive in tension")
+    loss = dissipates()
 
     def equations(self, v_a: Expr, v_b: Expr) -> Equations:
         tension = self.coefficient * (v_b - v_a)
@@ -234,6 +262,7 @@ class FrictionBetween(Component):
     a = takes_motion("first part")
     b = takes_motion("second part")
     friction = observable(Force, "friction force on b, towards the velocity of a")
+    loss = dissipates()
 
     def equations(self, v_a: Expr, v_b: Expr) -> Equations:
         slip = v_a - v_b
@@ -277,6 +306,8 @@ class ElasticEndStops(Component):
 
     rod = takes_motion("what the stops hold")
     force = observable(Force, "force of the stops on the rod's mass")
+    stored_energy = stores_energy("strain energy of the stops")
+    loss = dissipates()
 
     @model_validator(mode="after")
     def _stops_in_order(self) -> Self:
@@ -286,8 +317,14 @@ class ElasticEndStops(Component):
 
     def equations(self, x_rod: Expr, v_rod: Expr) -> Equations:
         law = (self.stiffness, self.restitution, self.impact_velocity)
-        force = contact_force(self.low - x_rod, -v_rod, *law) - contact_force(x_rod - self.high, v_rod, *law)
-        return {"f_rod": -force, "force": force}
+        low, high = maximum(self.low - x_rod, 0.0), maximum(x_rod - self.high, 0.0)
+        force = contact_force(low, -v_rod, *law) - contact_force(high, v_rod, *law)
+        return {
+            "f_rod": -force,
+            "force": force,
+            "stored_energy": self.stiffness * (low * low + high * high) / 2,
+            "loss": (self.stiffness * (low - high) - force) * v_rod,
+        }
 
 
 class ElasticContact(Component):
@@ -310,11 +347,19 @@ class ElasticContact(Component):
     a = takes_motion("the part at lower x")
     b = takes_motion("the part at higher x")
     force = observable(Force, "force that pushes the parts apart")
+    stored_energy = stores_energy("strain energy of the contact")
+    loss = dissipates()
 
     def equations(self, x_a: Expr, x_b: Expr, v_a: Expr, v_b: Expr) -> Equations:
-        depth, closing = x_a + self.clearance - x_b, v_a - v_b
+        depth, closing = maximum(x_a + self.clearance - x_b, 0.0), v_a - v_b
         force = contact_force(depth, closing, self.stiffness, self.restitution, self.impact_velocity)
-        return {"f_a": force, "f_b": -force, "force": force}
+        return {
+            "f_a": force,
+            "f_b": -force,
+            "force": force,
+            "stored_energy": self.stiffness * depth * depth / 2,
+            "loss": (force - self.stiffness * depth) * closing,
+        }
 
 
 class ForceSource(Component):
@@ -329,6 +374,7 @@ class ForceSource(Component):
     force: Force = Field(description="force on the mass, positive towards increasing x")
 
     rod = takes_motion("the pushed mass")
+    supply = supplies()
 
     def equations(self) -> Equations:
         return {"f_rod": -self.force}
@@ -345,6 +391,7 @@ class SignalForceSource(Component):
 
     force = takes_signal(Force, "force on the mass, positive towards increasing x")
     rod = takes_motion("the pushed mass")
+    supply = supplies()
 
     def equations(self, force: Expr) -> Equations:
         return {"f_rod": -force}
@@ -363,6 +410,7 @@ class MotionSource(Component):
     position: Length = Field(default=0.0, description="position at t = 0")
 
     port = gives_motion("the driven end")
+    supply = supplies()
 
     def equations(self, t: Expr) -> Equations:
         return {"x_port": self.position + self.velocity * t, "v_port": self.velocity}

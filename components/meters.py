@@ -1,5 +1,7 @@
 """Meters: power passing through a line, a rod, a shaft, and what adds up to volume and energy."""
 
+from typing import ClassVar
+
 from crescentlab.component import Component, Equations
 from crescentlab.domain import (
     gives_motion,
@@ -27,6 +29,8 @@ class HydraulicPowerMeter(Component):
     in the fluid's compression. Source: definition of hydraulic power, ISO 4391.
     """
 
+    lossless: ClassVar[bool] = True
+
     a = takes_pressure("side of the volume")
     b = gives_pressure("side that draws from it")
     y = gives_signal(Power, "power from a to b")
@@ -43,6 +47,8 @@ class LinearPowerMeter(Component):
     x [m]; v [m/s]; f [N] on the meter; y [W] from a to b. Port a belongs to the side whose motion is given (a mass),
     port b to a net without a giver of its own. Not for a place between two masses. Source: definition of power.
     """
+
+    lossless: ClassVar[bool] = True
 
     a = takes_motion("side of the mass")
     b = gives_motion("side of what acts on it")
@@ -61,6 +67,8 @@ class ShaftPowerMeter(Component):
     given (a drive, an inertia), port b to a net without a giver of its own. Not for a place between two inertias.
     Source: definition of power.
     """
+
+    lossless: ClassVar[bool] = True
 
     a = takes_rotation("side of the drive")
     b = gives_rotation("side of the load")
@@ -97,6 +105,8 @@ class VolumeCounter(Component):
     to b and backwards while the flow turns round. Port a belongs to the side whose pressure is given, port b to a net
     without a giver of its own. Not for the volume at the pressure of the line. Source: definition.
     """
+
+    lossless: ClassVar[bool] = True
 
     a = takes_pressure("side of the volume")
     b = gives_pressure("side that draws from it")

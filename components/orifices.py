@@ -3,7 +3,7 @@
 from pydantic import Field
 
 from crescentlab.component import Component, Equations
-from crescentlab.domain import observable, takes_pressure, takes_signal
+from crescentlab.domain import dissipates, observable, takes_pressure, takes_signal
 from crescentlab.fluid import Fluid
 from crescentlab.maths import Expr, maximum, sqrt
 from crescentlab.units import Area, Density, Flow, Length, Pressure, Ratio
@@ -34,6 +34,7 @@ class Orifice(Component):
     a = takes_pressure("upstream", size="count")
     b = takes_pressure("downstream", size="count")
     q = observable(Flow, "flow from a to b", size="count")
+    loss = dissipates()
 
     def equations(self, p_a: Expr, p_b: Expr, fluid: Fluid) -> Equations:
         d_h = self.hydraulic_diameter
@@ -78,6 +79,7 @@ class VariableOrifice(Component):
     b = takes_pressure("downstream", size="count")
     opening = takes_signal(Ratio, "open share of the area", size="count")
     q = observable(Flow, "flow from a to b", size="count")
+    loss = dissipates()
 
     def equations(self, p_a: Expr, p_b: Expr, opening: Expr, fluid: Fluid) -> Equations:
         area = self.area * maximum(opening, 0.0)
@@ -95,12 +97,14 @@ class LaminarTurbulentOrifice(Component):
               Re_t = \left(\frac{C_d}{\delta}\right)^2
 
     \Delta p = p_a - p_b [Pa]; v = q/(n A) [m/s]; A = `area` [m^2]; n = `parallel` [-]; C_d = `cd_turbulent` [-];
-    \delta = `laminar_coefficient` [-], 0.2 for round holes and 0.157 for slits; d_h [m], by default
-    \sqrt{4A/\pi + d_r^2} with d_r = `diameter_rounding` [m]; \rho [kg/m^3], \nu [m^2/s] at the mean pressure.
-    Its ends are the laminar q = 2 \delta^2 d_h A \Delta p/\mu and the turbulent C_d A \sqrt{2\Delta p/\rho}; at the
-    transition Reynolds number Re_t, 9.3 for a round hole, both parts of the drop are equal. Not for cavitating flow.
-    Source: H. E. Merritt, Hydraulic Control Systems (1967), section 3-3; joined smoothly, linear at zero drop, after
-    W. Borutzky, B. Barnard, J. Thoma, Simulation Modelling Practice and Theory 10 (2002) 141-152.
+    \delta = `laminar_coefficient` [-], 0.157 for slits and 0.2 for round holes by Wuest; exact creeping flow through a
+    hole in a thin plate has 0.163, two thirds of that flow (Sampson); d_h [m], by default \sqrt{4A/\pi + d_r^2} with
+    d_r = `diameter_rounding` [m]; \rho [kg/m^3], \nu [m^2/s] at the mean pressure. Its ends are
+    the laminar q = 2 \delta^2 d_h A \Delta p/\mu and the turbulent C_d A \sqrt{2\Delta p/\rho}; at the transition
+    Reynolds number Re_t, 9.3 for \delta = 0.2, both parts of the drop are equal. Not for cavitating flow. Source: H. E.
+    Merritt, Hydraulic Control Systems (1967), chapter 3, after W. Wuest, Ingenieur-Archiv 22 (1954) 357-367; R. A.
+    Sampson, Phil. Trans. R. Soc. A 182 (1891) 449-518; joined smoothly, linear at zero drop, after W. Borutzky, B.
+    Barnard, J. Thoma, Simulation Modelling Practice and Theory 10 (2002) 141-152.
     """
 
     area: Area = Field(ge=0, description="flow area; 0 is closed")
@@ -113,6 +117,7 @@ class LaminarTurbulentOrifice(Component):
     a = takes_pressure("upstream")
     b = takes_pressure("downstream")
     q = observable(Flow, "flow from a to b")
+    loss = dissipates()
 
     def equations(self, p_a: Expr, p_b: Expr, fluid: Fluid) -> Equations:
         d_h = self.hydraulic_diameter
@@ -146,6 +151,7 @@ class RatedOrifice(Component):
     a = takes_pressure("upstream")
     b = takes_pressure("downstream")
     q = observable(Flow, "flow from a to b")
+    loss = dissipates()
 
     def equations(self, p_a: Expr, p_b: Expr, fluid: Fluid) -> Equations:
         drop, transition = (p_a - p_b) / self.rated_drop, self.transition_drop / self.rated_drop

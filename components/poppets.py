@@ -5,7 +5,7 @@ from typing import Any, Literal, Self
 from pydantic import BaseModel, Field, model_validator
 
 from crescentlab.component import Component, Equations
-from crescentlab.domain import observable, takes_motion, takes_pressure
+from crescentlab.domain import dissipates, observable, takes_motion, takes_pressure
 from crescentlab.fluid import Fluid
 from crescentlab.maths import Expr, cos, maximum, minimum, pi, sin, sqrt
 from crescentlab.units import Angle, Area, Flow, Force, Length, Ratio
@@ -93,6 +93,7 @@ class ConicalPoppet(_Poppet, Component):
     area = observable(Area, "open area")
     jet_force = observable(Force, "flow force, positive towards closing")
     force = observable(Force, "force of the fluid on the face, positive towards opening")
+    loss = dissipates()
 
     def equations(self, p_a: Expr, p_b: Expr, x_rod: Expr, v_rod: Expr, fluid: Fluid) -> Equations:
         sine, cosine = sin(self.half_angle), cos(self.half_angle)
@@ -125,6 +126,7 @@ class BallPoppet(_Poppet, Component):
     area = observable(Area, "open area")
     jet_force = observable(Force, "flow force, positive towards closing")
     force = observable(Force, "force of the fluid on the face, positive towards opening")
+    loss = dissipates()
 
     @model_validator(mode="after")
     def _ball_covers_the_seat(self) -> Self:
@@ -175,6 +177,7 @@ class FlapperNozzle(Component):
     q = observable(Flow, "flow out of the nozzle")
     area = observable(Area, "open area")
     force = observable(Force, "force on the flapper, positive towards increasing x")
+    loss = dissipates()
 
     def equations(self, p_a: Expr, p_b: Expr, x_rod: Expr, fluid: Fluid) -> Equations:
         sign = 1.0 if self.side == "pushes_up" else -1.0

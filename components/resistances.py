@@ -3,7 +3,7 @@
 from pydantic import Field
 
 from crescentlab.component import Component, Equations
-from crescentlab.domain import observable, takes_pressure
+from crescentlab.domain import dissipates, observable, takes_pressure
 from crescentlab.fluid import Fluid
 from crescentlab.maths import Expr
 from crescentlab.units import Density, Flow, FlowResistance, KinematicViscosity, Length, QuadraticResistance, Ratio
@@ -35,6 +35,7 @@ class PipeResistance(Component):
     a = takes_pressure("first end")
     b = takes_pressure("second end")
     q = observable(Flow, "flow from a to b")
+    loss = dissipates()
 
     def equations(self, p_a: Expr, p_b: Expr, fluid: Fluid) -> Equations:
         one = pipe_friction_flow(p_a, p_b, self.length, self.diameter, self.roughness, fluid, self.loss_coefficient)
@@ -53,7 +54,7 @@ class ShortTube(Component):
     side; \rho [kg/m^3], \nu [m^2/s] at the mean pressure. The two formulas, 1.7 % apart where they meet, are joined
     smoothly by the weight of Shah (1978), within 1.5 % of the one that holds. Drilled restrictors of one to some ten
     diameters; not for turbulent flow in long tubes (`pipe_resistance`), sharp edges (`orifice`) or cavitating flow.
-    Source: H. E. Merritt, Hydraulic Control Systems (1967), section 3-3, after Shapiro, Siegel & Kline (1954); M. G.
+    Source: H. E. Merritt, Hydraulic Control Systems (1967), chapter 3, after Shapiro, Siegel & Kline (1954); M. G.
     Rabie, Fluid Power Engineering (2009), Eqs. 2.40 and 2.41; R. K. Shah, J. Fluids Eng. 100 (1978) 177-179.
     """
 
@@ -64,6 +65,7 @@ class ShortTube(Component):
     a = takes_pressure("upstream")
     b = takes_pressure("downstream")
     q = observable(Flow, "flow from a to b")
+    loss = dissipates()
 
     def equations(self, p_a: Expr, p_b: Expr, fluid: Fluid) -> Equations:
         q = self.parallel * short_tube_flow(p_a, p_b, self.diameter, self.length, fluid)
@@ -90,6 +92,7 @@ class MeasuredResistance(Component):
     a = takes_pressure("first end")
     b = takes_pressure("second end")
     q = observable(Flow, "flow from a to b")
+    loss = dissipates()
 
     def equations(self, p_a: Expr, p_b: Expr, fluid: Fluid) -> Equations:
         mean = (p_a + p_b) / 2

@@ -3,9 +3,15 @@
 from pydantic import Field
 
 from crescentlab.component import Component, Equations
-from crescentlab.domain import gives_rotation, observable, state, takes_signal
+from crescentlab.domain import (
+    gives_rotation,
+    observable,
+    state,
+    supplies,
+    takes_signal,
+)
 from crescentlab.maths import Expr
-from crescentlab.units import Angle, Power, Speed, Torque
+from crescentlab.units import Angle, Speed, Torque
 
 
 class SpeedSource(Component):
@@ -24,7 +30,7 @@ class SpeedSource(Component):
     shaft = gives_rotation("the driven shaft")
     phi = state(Angle, "angle of the shaft", start="start_angle", nominal=1.0, counts=True)
     torque = observable(Torque, "torque the source gives to the shaft")
-    power = observable(Power, "power the source gives to the shaft")
+    power = supplies("power the source gives to the shaft")
 
     def equations(self, phi: Expr, torque_shaft: Expr) -> Equations:
         return {
@@ -52,7 +58,7 @@ class SignalSpeedSource(Component):
     speed = takes_signal(Speed, "speed of the shaft")
     phi = state(Angle, "angle of the shaft", start="start_angle", nominal=1.0, counts=True)
     torque = observable(Torque, "torque the source gives to the shaft")
-    power = observable(Power, "power the source gives to the shaft")
+    power = supplies("power the source gives to the shaft")
 
     def equations(self, phi: Expr, speed: Expr, torque_shaft: Expr) -> Equations:
         return {

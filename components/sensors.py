@@ -1,5 +1,7 @@
 """Sensors: turn a variable of a net into a signal without disturbing it."""
 
+from typing import ClassVar
+
 from crescentlab.component import Component, Equations
 from crescentlab.domain import (
     gives_motion,
@@ -58,6 +60,8 @@ class FlowSensor(Component):
     and no resistance. Not for a place between two volumes: they need a resistance between them, whose `q` is
     the flow. Source: ideal sensor.
     """
+
+    lossless: ClassVar[bool] = True
 
     a = takes_pressure("side of the volume")
     b = gives_pressure("side that draws from it")
@@ -138,6 +142,8 @@ class ForceSensor(Component):
     whose tension is the force. Source: ideal sensor; Newton's third law.
     """
 
+    lossless: ClassVar[bool] = True
+
     a = takes_motion("side of the mass")
     b = gives_motion("side of what acts on it")
     y = gives_signal(Force, "force from a on b")
@@ -156,6 +162,8 @@ class TorqueSensor(Component):
     own. It has neither inertia nor compliance. Not for a place between two inertias: they need a shaft between them.
     Source: ideal sensor; Newton's third law.
     """
+
+    lossless: ClassVar[bool] = True
 
     a = takes_rotation("side of the drive")
     b = gives_rotation("side of the load")

@@ -1,14 +1,23 @@
 """Rotational mechanics: inertias, elastic shafts, gear ratios, torques, friction. Imposed speeds are in `rotation`."""
 
-from typing import Literal
+from typing import ClassVar, Literal
 
 from pydantic import Field
 
 from crescentlab import units
 from crescentlab.component import Component, Equations
-from crescentlab.domain import gives_rotation, observable, state, takes_rotation, takes_signal
+from crescentlab.domain import (
+    dissipates,
+    gives_rotation,
+    observable,
+    state,
+    stores_energy,
+    supplies,
+    takes_rotation,
+    takes_signal,
+)
 from crescentlab.maths import Expr, exp, fabs, tanh
-from crescentlab.units import Angle, Energy, Power, Ratio, RotaryDamping, RotaryStiffness, Speed, Torque
+from crescentlab.units import Angle, Ratio, RotaryDamping, RotaryStiffness, Speed, Torque
 
 
 class Inertia(Component):
@@ -26,7 +35,7 @@ class Inertia(Component):
     shaft = gives_rotation("the rotor")
     phi = state(Angle, "angle", start=0.0, nominal=1.0, counts=True)
     omega = state(Speed, "speed", start=0.0, nominal=1.0)
-    kinetic_energy = observable(Energy, "kinetic energy")
+    kinetic_energy = stores_energy("kinetic energy")
 
     def equations(self, phi: Expr, omega: Expr, torque_shaft: Expr) -> Equations:
         return {
@@ -53,6 +62,7 @@ class SwivellingInertia(Component):
     shaft = gives_rotation("the rotor")
     phi = state(Angle, "angle", start=0.0, nominal=1e-2)
     omega = state(Speed, "speed", start=0.0, nominal=1.0)
+    kinetic_energy = stores_energy("kinetic energy")
 
     def equations(self, phi: Expr, omega: Expr, torque_shaft: Expr) -> Equations:
         return {
@@ -60,6 +70,7 @@ class SwivellingInertia(Component):
             "omega_shaft": omega,
             "der_phi": omega,
             "der_omega": torque_shaft / self.inertia,
+            "kinetic_energy": self.inertia * omega * omega / 2,
         }
 
 
@@ -76,9 +87,13 @@ class TorsionSpring(Component):
     preload: Torque = Field(default=0.0, description="torque at angle 0")
 
     shaft = takes_rotation("the sprung rotor")
+    stored_energy = stores_energy("strain energy, 0 at angle 0")
 
     def equations(self, phi_shaft: Expr) -> Equations:
-        return {"torque_shaft": self.preload + self.stiffness * phi_shaft}
+        return {
+            "torque_shaft": self.preload + self.stiffness * phi_shaft,
+            "stored_energy": (self.preload + self.stiffness * phi_shaft / 2) * phi_shaft,
+        }
 
 
 class ElasticShaft(Component):
@@ -99,7 +114,8 @@ class ElasticShaft(Component):
     b = takes_rotation("driven end")
     twist = state(Angle, "angle of a less angle of b, from the torque-free state", start=0.0, nominal=1e-3)
     torque = observable(Torque, "torque from a to b")
-    stored_energy = observable(Energy, "strain energy")
+    stored_energy = stores_energy("strain energy")
+    loss = dissipates()
 
     def equations(self, twist: Expr, omega_a: Expr, omega_b: Expr) -> Equations:
         slip = omega_a - omega_b
@@ -110,6 +126,7 @@ class ElasticShaft(Component):
             "der_twist": slip,
             "torque": torque,
             "stored_energy": self.stiffness * twist * twist / 2,
+            "loss": self.damping * slip * slip,
         }
 
 
@@ -123,6 +140,8 @@ class GearRatio(Component):
     gives its rotation to what it drives: a second inertia goes behind an `elastic_shaft`, or is reflected to a as
     J/i^2. Not for losses of gears: put a `rotary_friction` on a shaft. Source: rolling of pitch circles.
     """
+
+    lossless: ClassVar[bool] = True
 
     ratio: Ratio = Field(gt=0, description="speed of a over speed of b")
     sense: Literal["same", "opposite"] = Field(default="same", description="sense of rotation of b against a")
@@ -147,6 +166,7 @@ class RotaryDamper(Component):
     coefficient: RotaryDamping = Field(ge=0, description="torque per speed")
 
     shaft = takes_rotation("the rotor")
+    loss = dissipates()
 
     def equations(self, omega_shaft: Expr) -> Equations:
         return {"torque_shaft": self.coefficient * omega_shaft}
@@ -171,7 +191,7 @@ class RotaryFriction(Component):
     viscous_friction: RotaryDamping = Field(default=0.0, ge=0, description="torque per speed")
 
     shaft = takes_rotation("the rotor")
-    loss = observable(Power, "power turned into heat")
+    loss = dissipates()
 
     def equations(self, omega_shaft: Expr) -> Equations:
         share = omega_shaft / self.stribeck_speed
@@ -192,7 +212,7 @@ class TorqueSource(Component):
     torque: Torque = Field(description="torque on the rotor, positive towards increasing angle")
 
     shaft = takes_rotation("the driven rotor")
-    power = observable(Power, "power given to the rotor")
+    power = supplies("power given to the rotor")
 
     def equations(self, omega_shaft: Expr) -> Equations:
         return {"torque_shaft": -self.torque, "power": self.torque * omega_shaft}
@@ -209,7 +229,7 @@ class SignalTorqueSource(Component):
 
     torque = takes_signal(Torque, "torque on the rotor, positive towards increasing angle")
     shaft = takes_rotation("the driven rotor")
-    power = observable(Power, "power given to the rotor")
+    power = supplies("power given to the rotor")
 
     def equations(self, torque: Expr, omega_shaft: Expr) -> Equations:
         return {"torque_shaft": -torque, "power": torque * omega_shaft}
@@ -228,7 +248,7 @@ class FanLoad(Component):
     rated_speed: Speed = Field(gt=0, description="speed of the rating")
 
     shaft = takes_rotation("the driving rotor")
-    power = observable(Power, "power taken from the rotor")
+    power = dissipates("power taken from the rotor")
 
     def equations(self, omega_shaft: Expr) -> Equations:
         share = omega_shaft / self.rated_speed

@@ -3,7 +3,7 @@
 from pydantic import Field
 
 from crescentlab.component import Component, Equations
-from crescentlab.domain import held, observable, takes_pressure
+from crescentlab.domain import dissipates, held, observable, takes_pressure
 from crescentlab.fluid import Fluid
 from crescentlab.maths import Expr, when, where
 from crescentlab.units import Flow, Pressure, Ratio
@@ -30,6 +30,7 @@ class ShuttleValve(Metering, Component):
     outlet = takes_pressure("common port")
     at = held(Ratio, "1 joins a and the outlet, -1 joins b and the outlet", start=1.0)
     q = observable(Flow, "flow to the outlet")
+    loss = dissipates()
 
     def equations(self, p_a: Expr, p_b: Expr, p_outlet: Expr, at: Expr, fluid: Fluid) -> Equations:
         q_a = self.metered(p_a, p_outlet, where(at == 1, 1.0, 0.0), fluid)

@@ -77,7 +77,7 @@ class _Assembly:
         self, function: ca.Function, names: Sequence[str], x: ca.SX | None = None, h: ca.SX | None = None
     ) -> ca.SX:
         """A function of the trace that these components share: its results side by side, some columns for each."""
-        fluids = [fluid for name in names for fluid in self.plan.fluids[name]]
+        fluids = [fluid for name in names for fluid in self.plan.fluids[name].values()]
         parts = (
             (self.x if x is None else x, self.states.places(names)),
             (self.h if h is None else h, self.held.places(names)),
@@ -167,6 +167,7 @@ class _Assembly:
             _variables=self.variables,
             remapping=self.remap,
             _contents=self.contents(),
+            _energies=self.energies,
         )
 
     def names(self, kind: type[State] | type[Held]) -> tuple[list[str], list[Quantity]]:
@@ -434,12 +435,18 @@ class _Assembly:
         found: dict[str, tuple[Callable[[], ca.SX], Callable[[], tuple[ca.SX, ca.SX]]]] = {}
         for name, component in self.plan.components.items():
             for declared in type(component).declared(Observable):
-                if declared.stored:
+                if declared.entry == "content":
                     found[name] = (
                         functools.partial(self.content, name, declared.name),
                         functools.partial(self.flows, name),
                     )
         return found
+
+    def energies(self) -> dict[str, ca.SX]:
+        """Per component that keeps books of energy, its five rows."""
+        rows = self.every(lambda trace: trace.books)
+        layout = self.layout(lambda trace: trace.books.numel_out(0))
+        return {name: _part(rows, layout, name) for name, size in layout.slots if size}
 
     def content(self, name: str, observable: str) -> ca.SX:
         layout = self.plan.traces[name].observables

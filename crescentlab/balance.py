@@ -1,35 +1,76 @@
-"""The ledger of stored fluid: what flowed in against what is stored more, per component.
+"""The ledgers of a run: fluid and energy that came in against what is stored more, per component.
 
-.. math:: \\varepsilon = \\frac{\\left|\\int \\sum q \\, dt - \\Delta S\\right|}{\\max_i \\int \\sum |q_i| / 2 \\, dt}
+.. math:: \\varepsilon = \\frac{\\left|\\int \\sum q \\, dt - \\Delta S\\right|}{\\max_i \\int \\sum |q_i| / 2 \\, dt},
+          \\qquad \\varepsilon_E = \\frac{\\left|\\int \\left(\\sum P + P_s - P_d\\right) dt - \\Delta E\\right|}
+          {\\max_i \\int \\sum |P_i| / 2 \\, dt}
 
-The divisor is no less than a millionth of the largest S: at rest nothing flows but what the solver's tolerance leaves.
+S [m^3 at 0 bar gauge] is what the component's own law stores (its ``stores()`` observable); E [J] the energy in it
+(``stores_energy()``), P [W] the power that enters at a port (:mod:`crescentlab.energy`), P_s that from outside the
+circuit (``supplies()``), P_d that turned into heat (``dissipates()``). The divisors are no less than a millionth of the
+largest S or E: at rest nothing flows but what the solver's tolerance leaves.
 
-S [m^3 at 0 bar gauge] is what the component's own law stores (its ``stores()`` observable). Jumps of S
-at events are booked apart as ``merged``: volumes that are merged or parted take their content along.
-The integral uses the solver's own interpolant at three Gauss nodes per smooth piece.
+Jumps at events are booked apart: volumes that are merged or parted take their content along (``merged``), and what
+strikes a stop loses its motion (``at_events``). The integrals use the solver's own interpolant at three Gauss nodes per
+smooth piece.
 """
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass
+from typing import Any
 
 import casadi as ca
 import numpy as np
 
 from crescentlab.solvers.trajectory import GAUSS_NODES, GAUSS_WEIGHTS, Trajectory
+from crescentlab.symbols import column
 from crescentlab.system import System, Values
+
+Array = np.ndarray
 
 AT_REST = 1e-6
 """Where less than this share of the largest content flows, errors are told as shares of that much."""
 
 
 @dataclass(frozen=True)
+class EnergyBalance:
+    """Relative errors per component that keeps books of energy and for the circuit, and where the energy went [J]."""
+
+    components: dict[str, float]
+    circuit: float
+    supplied: float
+    """From outside the circuit, less what left it there."""
+    dissipated: dict[str, float]
+    """Turned into heat, per component that can do so."""
+    stored: float
+    """Change of what is stored."""
+    at_events: dict[str, float]
+    """Gained by jumps at events, negative where an impact lost it; part of ``stored``."""
+    silent: list[str]
+    """Components through which power passes and which do not say what becomes of it."""
+
+    def as_json(self) -> dict[str, object]:
+        """Plain data for ``--json``."""
+        return {
+            "circuit": self.circuit,
+            "components": self.components,
+            "supplied": self.supplied,
+            "dissipated": {k: v for k, v in self.dissipated.items() if v},
+            "stored": self.stored,
+            "at_events": {k: v for k, v in self.at_events.items() if v},
+            "silent": self.silent,
+        }
+
+
+@dataclass(frozen=True)
 class Balance:
-    """Relative errors per storing component and for the circuit, and content moved by events [m^3]."""
+    """Relative errors per storing component and for the circuit, content moved by events [m^3], and the energies."""
 
     components: dict[str, float]
     circuit: float
     merged: dict[str, float]
+    energy: EnergyBalance | None
 
     def as_json(self) -> dict[str, object]:
         """Plain data for ``--json``."""
@@ -37,41 +78,81 @@ class Balance:
             "circuit": self.circuit,
             "components": self.components,
             "merged": {k: v for k, v in self.merged.items() if v},
+            "energy": self.energy.as_json() if self.energy else None,
         }
 
 
 def balance(system: System, values: Values, trajectory: Trajectory) -> Balance | None:
-    """Compute the ledger; None if nothing stores or no step was made."""
-    contents = system.contents()
-    pieces = trajectory.pieces
-    if not contents or not len(pieces.low):
+    """Compute the ledgers; None if no step was made, or no component keeps books."""
+    contents, energies = system.contents(), system.energies()
+    if not (contents or energies) or not len(trajectory.pieces.low):
         return None
-    stored = ca.Function("S", system.arguments, [ca.vertcat(*[c for c, _, _ in contents.values()])])
-    flows = ca.Function(
-        "Q",
-        system.arguments,
-        [ca.vertcat(*[q for _, q, _ in contents.values()]), ca.vertcat(*[m for _, _, m in contents.values()])],
+    content, inflow, flow = (_rows(contents.values(), k) for k in range(3))
+    energy, loss, supply, entering, passing = (_rows(energies.values(), k) for k in range(5))
+    fluid_change, energy_change = _changes(system, values, trajectory, [content, energy])
+    net, size, left, power, lost, supplied = _integrals(
+        system, values, trajectory, [inflow, flow, entering + supply - loss, passing, loss, supply]
     )
+    energies_of = EnergyBalance(
+        *_errors(list(energies), left, power, energy_change), float(supplied.sum()), _by_name(energies, lost),
+        float(energy_change.total.sum()), _by_name(energies, energy_change.at_events), system.silent(),
+    )  # fmt: skip
+    return Balance(
+        *_errors(list(contents), net, size, fluid_change), _by_name(contents, fluid_change.moved),
+        energies_of if energies else None,
+    )  # fmt: skip
+
+
+def _rows(entries: Iterable[Any], k: int) -> ca.SX:
+    """Row ``k`` of every component, a column."""
+    return column([entry[k] for entry in entries])
+
+
+@dataclass(frozen=True)
+class _Change:
+    """What stored amounts changed by over a run, per component."""
+
+    total: Array
+    at_events: Array
+    moved: Array
+    """Sum of the magnitudes of the jumps."""
+    largest: Array
+    """Largest amount stored."""
+
+
+def _changes(system: System, values: Values, trajectory: Trajectory, stored: list[ca.SX]) -> list[_Change]:
+    t, x, h, b = trajectory.steps.arrays()
+    function = ca.Function("S", system.arguments, [ca.densify(each) for each in stored])
+    at = trajectory.steps.jumps
+    found: list[_Change] = []
+    for amounts in map(np.array, function(t.reshape(1, -1), x.T, h.T, b.T, values.p)):
+        jumps = amounts[:, at] - amounts[:, at - 1]
+        total, largest = amounts[:, -1] - amounts[:, 0], np.abs(amounts).max(axis=1)
+        found.append(_Change(total, jumps.sum(axis=1), np.abs(jumps).sum(axis=1), largest))
+    return found
+
+
+def _integrals(system: System, values: Values, trajectory: Trajectory, rates: list[ca.SX]) -> list[Array]:
+    """Integrals of ``rates`` over the run."""
+    function = ca.Function("Q", system.arguments, [ca.densify(column(rates))])
+    pieces = trajectory.pieces
     low, high = np.array(pieces.low), np.array(pieces.high)
-    into = np.zeros((len(contents), low.size))
-    size = np.zeros_like(into)
     h, b = np.array(pieces.h).T, np.array(pieces.b).T
     x = pieces.at_nodes()
+    found = np.zeros(function.numel_out(0))
     for node, weight in enumerate(GAUSS_WEIGHTS):
         # relations that compare time read it from frozen bits, so the node's own time serves signals
         t = low + (high - low) * GAUSS_NODES[node]
-        q, m = flows(t.reshape(1, -1), x[:, node, :].T, h, b, values.p)
-        into += weight * np.array(q) * (high - low)
-        size += weight * np.array(m) * (high - low)
-    t, xs, hs, bs = trajectory.steps.arrays()
-    content = np.array(stored(t.reshape(1, -1), xs.T, hs.T, bs.T, values.p))
-    jumps = trajectory.steps.jumps
-    moved = content[:, jumps] - content[:, jumps - 1] if jumps.size else np.zeros((len(contents), 0))
-    change = content[:, -1] - content[:, 0] - moved.sum(axis=1)
-    largest = max(float(size.sum(axis=1).max()), AT_REST * float(np.abs(content).max()), 1e-300)
-    error = into.sum(axis=1) - change
-    names = list(contents)
-    return Balance(
-        {n: float(abs(e) / largest) for n, e in zip(names, error, strict=True)}, float(abs(error.sum()) / largest),
-        {n: float(v) for n, v in zip(names, np.abs(moved).sum(axis=1), strict=True)},
-    )  # fmt: skip
+        found += np.array(function(t.reshape(1, -1), x[:, node, :].T, h, b, values.p)) @ (weight * (high - low))
+    return np.split(found, np.cumsum([each.numel() for each in rates])[:-1])
+
+
+def _errors(names: list[str], into: Array, passing: Array, change: _Change) -> tuple[dict[str, float], float]:
+    """Errors per component and of the circuit, as shares of the most that passed through any component."""
+    unit = max(float(passing.max(initial=0)), AT_REST * float(change.largest.max(initial=0)), 1e-300)
+    missing = into - (change.total - change.at_events)
+    return _by_name(names, np.abs(missing) / unit), float(abs(missing.sum()) / unit)
+
+
+def _by_name(names: Iterable[str], numbers: Array) -> dict[str, float]:
+    return {name: float(number) for name, number in zip(names, numbers, strict=True)}

@@ -17,11 +17,12 @@ import networkx as nx
 from crescentlab.component import Component
 from crescentlab.domain import CHAMBER, HYDRAULIC, SIGNAL, Port
 from crescentlab.elaborate import Design, Instance
+from crescentlab.energy import fluid_ports, fluids_asked, fluids_needed
 from crescentlab.errors import CausalityError, ComponentError, InputError, nearest
 from crescentlab.fluid import Fluid
 from crescentlab.graph import Graph, Member, Net
 from crescentlab.library import Library
-from crescentlab.trace import Trace, fluid_ports, fluids_asked, structure_of, trace
+from crescentlab.trace import Trace, structure_of, trace
 
 Variable = tuple[str, int]
 """An instance's port output: instance name, place in its trace's output layout."""
@@ -50,8 +51,8 @@ class Plan:
     graph: Graph
     components: dict[str, Component]
     traces: dict[str, Trace]
-    fluids: dict[str, tuple[str, ...]]
-    """Per instance, the circuit's fluid for each fluid its equations ask for."""
+    fluids: dict[str, dict[str, str]]
+    """Per instance, the circuit's fluid for each fluid its equations, or the power through its ports, ask for."""
     sources: dict[str, tuple[Source, ...]]
     order: tuple[tuple[Step, ...], ...]
     """Waves of steps: each needs only what the waves before it give."""
@@ -157,27 +158,31 @@ def _giver(graph: Graph, net: Net, components: dict[str, Component], allow_open:
 # -- fluids --------------------------------------------------------------------------------------
 
 
-def _fluids(graph: Graph, components: dict[str, Component], library: Library) -> dict[str, tuple[str, ...]]:
+def _fluids(graph: Graph, components: dict[str, Component], library: Library) -> dict[str, dict[str, str]]:
     """The fluid of every fluid argument, spread over nets from those that name one."""
     design = graph.design
     of_net = _fluid_of_nets(graph, components)
     if len(design.fluids) == 1:
-        return {name: tuple(design.fluids) * len(fluids_asked(type(c))) for name, c in components.items()}
+        return {
+            name: dict.fromkeys(fluids_needed(type(c)), next(iter(design.fluids))) for name, c in components.items()
+        }
     nets_of: dict[tuple[str, str], list[str]] = {}
     for net in graph.nets:
         for m in net.members:
             nets_of.setdefault((m.instance, m.port.name), []).append(net.name)
-    result: dict[str, tuple[str, ...]] = {}
+    result: dict[str, dict[str, str]] = {}
     for name, component in components.items():
-        chosen: list[str] = []
-        for argument in fluids_asked(type(component)):
+        chosen: dict[str, str] = {}
+        for argument in fluids_needed(type(component)):
             found = [
                 of_net[n]
                 for p in fluid_ports(type(component), argument)
                 for n in nets_of.get((name, p), [])
                 if n in of_net
             ]
-            if not found:
+            if found:
+                chosen[argument] = found[0]
+            elif argument in fluids_asked(type(component)):
                 if not design.fluids:
                     raise InputError(
                         "the circuit names no fluid; write for example fluid: {type: simple_oil, density: 860 kg/m^3}",
@@ -188,8 +193,7 @@ def _fluids(graph: Graph, components: dict[str, Component], library: Library) ->
                     f"for example {{fluid: {next(iter(design.fluids))}, ports: [...]}}",
                     design.instances[name].place,
                 )
-            chosen.append(found[0])
-        result[name] = tuple(chosen)
+        result[name] = chosen
     return result
 
 
@@ -250,14 +254,12 @@ def _fluid_of_nets(graph: Graph, components: dict[str, Component]) -> dict[str, 
 # -- traces --------------------------------------------------------------------------------------
 
 
-def _traces(design: Design, components: dict[str, Component], fluids: dict[str, tuple[str, ...]]) -> dict[str, Trace]:
+def _traces(design: Design, components: dict[str, Component], fluids: dict[str, dict[str, str]]) -> dict[str, Trace]:
     cache: dict[Any, Trace] = {}
     result: dict[str, Trace] = {}
     for name, component in components.items():
-        mine: dict[str, Fluid] = {
-            arg: design.fluids[f] for arg, f in zip(fluids_asked(type(component)), fluids[name], strict=True)
-        }
-        key = (structure_of(component), tuple(structure_of(f) for f in mine.values()))
+        mine: dict[str, Fluid] = {argument: design.fluids[fluid] for argument, fluid in fluids[name].items()}
+        key = (structure_of(component), tuple((argument, structure_of(f)) for argument, f in mine.items()))
         if key not in cache:
             try:
                 cache[key] = trace(component, mine)

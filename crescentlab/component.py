@@ -71,6 +71,9 @@ class Component(BaseModel):
     def __pydantic_init_subclass__(cls, **kwargs: Any) -> None:
         _check_class(cls)
 
+    lossless: ClassVar[bool] = False
+    """Whether all the power that enters leaves at once, as through a lever, a pair of gears or a meter."""
+
     # A class without states or ports of its own is still a component; its equations are required.
     equations: ClassVar[Callable[..., Equations]]
 
@@ -98,6 +101,12 @@ class Component(BaseModel):
     def asks_for(cls) -> list[str]:
         """Names of the arguments of ``equations``."""
         return list(_arguments(cls))
+
+    @classmethod
+    def deduced_observable(cls) -> str | None:
+        """The loss or supply that ``equations`` may leave out: where nothing else is said of energy."""
+        said = [o for o in _declared(cls, Observable) if o.entry in ("energy", "dissipation", "supply")]
+        return said[0].name if len(said) == 1 and said[0].deduced else None
 
     @classmethod
     def type_name(cls) -> str:
@@ -265,7 +274,7 @@ def check_returned(cls: type[Component], returned: Any) -> None:
     if not isinstance(returned, dict):
         raise ComponentError(f"{where}: equations must return a dictionary, not {type(returned).__name__}")
     must = returns(cls)
-    missing = must - returned.keys()
+    missing = must - returned.keys() - {cls.deduced_observable()}
     if missing:
         raise ComponentError(f"{where}: equations does not return {', '.join(sorted(missing))}")
     for name, value in returned.items():

@@ -16,6 +16,8 @@ from crescentlab import units
 from crescentlab.units import Quantity
 
 Role = Literal["gives", "takes", "reads", "undecided"]
+Entry = Literal["", "content", "energy", "dissipation", "supply"]
+"""What an observable enters in a ledger: fluid stored, energy stored, power turned into heat, power from outside."""
 
 
 @dataclass(frozen=True)
@@ -189,12 +191,17 @@ class Held(Declared):
 
 @dataclass(eq=False)
 class Observable(Declared):
-    """A returned value that a result can show; ``stored`` marks a component's fluid content."""
+    """A returned value that a result can show; ``entry`` says what it enters in the ledgers of fluid and energy."""
 
     quantity: Quantity | str
     description: str
     size: Size | None = None
-    stored: bool = False
+    entry: Entry = ""
+
+    @property
+    def deduced(self) -> bool:
+        """Whether equations may leave it out: it is then the power through the component's ports."""
+        return self.entry in ("dissipation", "supply")
 
 
 def _named(quantity: Any) -> Quantity | str:
@@ -228,4 +235,30 @@ def observable(quantity: Any, description: str, *, size: Size | None = None) -> 
 
 def stores(description: str = "fluid content, as volume at 0 bar gauge") -> Any:
     """The observable [m^3] whose rate equals the sum of the component's hydraulic flows (its balance)."""
-    return Observable(units.volume, description, None, stored=True)
+    return Observable(units.volume, description, None, "content")
+
+
+def stores_energy(description: str = "stored energy") -> Any:
+    """The observable [J], a function of states and held values, whose rate the ledger of energy expects.
+
+    Its rate, with what :func:`dissipates` says [W], equals the power that enters through the ports: p q at hydraulic
+    ports (strictly :math:`\\rho_0 q w(p)`, see ``Fluid.enthalpy``), f v, torque omega, and p dV/dt of chambers. Fluid
+    of volume V holds V times ``fluid.energy_density(p)``.
+    """
+    return Observable(units.energy, description, None, "energy")
+
+
+def dissipates(description: str = "power turned into heat") -> Any:
+    """The observable [W] of what leaves the circuit as heat. A part that loses nothing returns 0.
+
+    A part that stores no energy may leave it out of what it returns: all that enters through its ports is then lost.
+    """
+    return Observable(units.power, description, None, "dissipation")
+
+
+def supplies(description: str = "power from outside the circuit") -> Any:
+    """The observable [W] of a source or a boundary, negative where power leaves there.
+
+    A part that stores no energy may leave it out: it then supplies all that leaves through its ports.
+    """
+    return Observable(units.power, description, None, "supply")

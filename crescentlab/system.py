@@ -21,6 +21,7 @@ from crescentlab.causality import Plan
 from crescentlab.component import Component
 from crescentlab.domain import Held, State
 from crescentlab.elaborate import Design
+from crescentlab.energy import keeps_books, power_ports
 from crescentlab.errors import InputError, nearest
 from crescentlab.prepared import Prepared, jacobian, prepare
 from crescentlab.trace import numeric_fields, structure_of
@@ -110,6 +111,7 @@ class System:
     remapping: Callable[[list[bool]], tuple[ca.SX, list[ca.SX]]]
     """Which events may fire -> symbols (1 where one fires), and the new x and h as expressions of them."""
     _contents: dict[str, tuple[Callable[[], ca.SX], Callable[[], tuple[ca.SX, ca.SX]]]]
+    _energies: Callable[[], dict[str, ca.SX]]
     _functions: dict[Any, ca.Function] = field(default_factory=dict)
     _once: dict[str, Any] = field(default_factory=dict)
     built: dict[tuple[str, str], Prepared] = field(default_factory=dict)
@@ -216,6 +218,15 @@ class System:
         """Per storing component: stored volume, sum of its flows, half the sum of their magnitudes."""
         return {name: (content(), *flows()) for name, (content, flows) in self._contents.items()}
 
+    def energies(self) -> dict[str, ca.SX]:
+        """Per component that keeps books of energy, the five rows of :func:`crescentlab.energy.books`."""
+        return self._energies()
+
+    def silent(self) -> list[str]:
+        """Components through which power passes and which do not say what becomes of it."""
+        classes = {name: type(component) for name, component in self.plan.components.items()}
+        return [name for name, cls in classes.items() if power_ports(cls) and not keeps_books(cls)]
+
     def values(self, design: Design) -> Values:
         """Numbers for this structure; raises if ``design`` has another structure."""
         p: list[float] = []
@@ -234,7 +245,7 @@ class System:
             if structure_of(component) != structure_of(shape):
                 raise InputError(f"{name}: this value changes the structure; assemble the circuit anew", instance.place)
             p += [float(getattr(component, n)) for n in self.plan.traces[name].parameters]
-            mine = [fluids[f] for f in self.plan.fluids[name]]
+            mine = [fluids[f] for f in self.plan.fluids[name].values()]
             x0 += [
                 _start(instance.start, s, component, mine, name, instance.place)
                 for s in type(component).declared(State)

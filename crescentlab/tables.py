@@ -52,6 +52,19 @@ class Curve(BaseModel):
             result = maths.event_where(x > self.x[k], float(slopes[k]), result)
         return result
 
+    def work(self, x: Any) -> Any:
+        """Integral of x dy from the first point on: what moving something by y against x takes."""
+        knots, slopes = np.array(self.x), np.diff(self.y) / np.diff(self.x)
+        before = np.concatenate([[0.0], np.cumsum(slopes * np.diff(knots**2) / 2)])
+        if not isinstance(x, Sym):
+            piece = np.clip(np.searchsorted(knots, x, side="right") - 1, 0, len(slopes) - 1)
+            return (before[piece] + slopes[piece] * (np.asarray(x) ** 2 - knots[piece] ** 2) / 2)[()]
+        result: Any = float(slopes[0]) * (x * x - knots[0] ** 2) / 2
+        for k in range(1, len(slopes)):
+            here = float(before[k]) + float(slopes[k]) * (x * x - knots[k] ** 2) / 2
+            result = maths.event_where(x > self.x[k], here, result)
+        return result
+
 
 @dataclass(frozen=True)
 class CurveOf:

@@ -17,8 +17,9 @@ import casadi as ca
 import numpy as np
 from pydantic import BaseModel
 
-from crescentlab.component import Component, check_returned, fluid_names, structural_fields
-from crescentlab.domain import HYDRAULIC, Held, Observable, State
+from crescentlab.component import Component, check_returned, structural_fields
+from crescentlab.domain import Held, Observable, State
+from crescentlab.energy import books, deduced, powers
 from crescentlab.errors import ComponentError
 from crescentlab.fluid import Fluid
 from crescentlab.maths import TRACER, Event, Failure, Tick
@@ -127,6 +128,8 @@ class Trace:
     period: ca.Function
     clock: ca.Function
     """Values inside the equations that depend on time alone."""
+    books: ca.Function
+    """Five rows of the ledger of energy, or none; see :func:`crescentlab.energy.books`."""
 
 
 def numeric_fields(model: type[BaseModel], values: Any) -> tuple[str, ...]:
@@ -181,21 +184,11 @@ class _Bits:
         return symbol
 
 
-@functools.cache
-def fluids_asked(cls: type[Component]) -> tuple[str, ...]:
-    """The fluid arguments of a class's equations, in order."""
-    asked = set(cls.asks_for())
-    return tuple(n for n in fluid_names(cls) if n in asked)
-
-
-def fluid_ports(cls: type[Component], fluid: str) -> list[str]:
-    """Hydraulic ports whose net decides the fluid argument ``fluid``."""
-    hydraulic = [p.name for p in cls.ports() if p.domain is HYDRAULIC]
-    return hydraulic if fluid == "fluid" else [fluid.removeprefix("fluid_")]
-
-
 def trace(component: Component, fluids: dict[str, Fluid]) -> Trace:
-    """Trace ``component``'s class in its structure; raises :class:`ComponentError` naming class and line."""
+    """Trace ``component``'s class in its structure; raises :class:`ComponentError` naming class and line.
+
+    ``fluids`` are those of :func:`crescentlab.energy.fluids_needed`, by argument.
+    """
     return _Tracing(component, fluids).done()
 
 
@@ -213,7 +206,7 @@ class _Tracing:
         self.outputs = layout((name, port.size) for port in cls.ports() for name, _ in port.outputs())
         self.observables = layout((o.name, o.size) for o in cls.declared(Observable))
         self.parameters = numeric_fields(cls, component)
-        self.fluid_names = fluids_asked(cls)
+        self.fluid_names = tuple(fluids)
         self.t = ca.SX.sym("t")
         self.x, self.h, self.u = (_symbols(lay.slots) for lay in (self.states, self.held, self.inputs))
         self.p = _symbols([(n, None) for n in self.parameters])
@@ -246,6 +239,8 @@ class _Tracing:
         try:
             returned = self.symbolic.equations(**{n: self.known[n] for n in self.cls.asks_for()})
             check_returned(self.cls, returned)
+            self.entering = powers(self.cls, {**self.known, **returned}, {n: self.known[n] for n in self.fluid_names})
+            returned = {**deduced(self.cls, self.entering), **returned}
             self.switching = len(bits.relations)  # those that follow come from conditions
             self.conditions = [
                 self.lowered(e.condition, bits) if isinstance(e, (Event, Failure)) else ca.SX(0)
@@ -300,6 +295,7 @@ class _Tracing:
             function("rel", ca.horzcat(column(relations), column(scales))), tuple(events),
             function("cond", column(conditions)),
             function("period", column(periods)), function("clock", clock),
+            function("books", books(self.cls, returned, self.entering)),
         )  # fmt: skip
 
     @staticmethod

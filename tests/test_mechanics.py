@@ -215,9 +215,9 @@ def test_stick_slip_oscillator():
 
 
 def test_mass_obeys_newton_everywhere():
-    """2 N on 0.5 kg give 4 m/s^2, and nothing else happens."""
+    """2 N on 0.5 kg give 4 m/s^2, 0.3 m/s hold 0.0225 J, and nothing else happens."""
     got = Mass(mass=0.5).equations(x=-7.0, v=0.3, f_port=2.0)
-    assert got == {"x_port": -7.0, "v_port": 0.3, "der_x": 0.3, "der_v": 4.0}
+    assert got == {"x_port": -7.0, "v_port": 0.3, "der_x": 0.3, "der_v": 4.0, "kinetic_energy": 0.0225}
 
 
 @pytest.mark.parametrize(

@@ -19,7 +19,7 @@ ROOT = Path(__file__).resolve().parents[1]
 
 LAYERS: tuple[tuple[str, ...], ...] = (
     ("errors", "symbols", "units", "maths", "compiler", "c_text", "prepared"),
-    ("tables", "fluid", "domain", "component"),
+    ("tables", "fluid", "domain", "component", "energy"),
     ("expressions", "yaml_text", "explain", "library", "netlist"),
     ("elaborate",),
     ("graph", "trace", "contract"),

@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import Any
 
 from crescentlab import plotting
+from crescentlab.balance import Balance
 from crescentlab.circuit import Circuit, load
 from crescentlab.cli import DONE, FAILED, INTERRUPTED
 from crescentlab.commands import arguments as shared
@@ -25,6 +26,8 @@ log = logging.getLogger("crescentlab")
 EXIT_CODES = {"done": DONE, "stopped": DONE, "failed": FAILED, "interrupted": INTERRUPTED}
 MAX_NETS = 12
 """Most net pressures listed in the summary."""
+MAX_SILENT = 4
+"""Most components listed that keep no books of energy."""
 
 
 def arguments(parser: argparse.ArgumentParser) -> None:
@@ -160,12 +163,38 @@ def _facts(result: Result) -> list[tuple[str, str]]:
         ("model", "; ".join((counted(states, "state"), counted(s.events, "event"), counted(s.ticks, "tick")))),
     ]
     if result.balance is not None:
-        worst = max(result.balance.components.items(), key=lambda item: item[1])
-        rows.append(("balance", f"{result.balance.circuit:.1e} of the flow; at most {worst[1]:.1e}, {worst[0]}"))
-        merged = sum(result.balance.merged.values())
-        if merged:
-            rows.append(("merged", f"{QUANTITIES['volume'].show(merged, 'cm3', 3)} moved by events"))
+        rows += _ledgers(result.balance)
     return rows
+
+
+def _ledgers(balance: Balance) -> Iterator[tuple[str, str]]:
+    """How well the balances of fluid and energy close, and where the energy went."""
+
+    def closes(circuit: float, components: dict[str, float]) -> str:
+        worst = max(components, key=lambda name: components[name])
+        return f"{circuit:.1e}; at most {components[worst]:.1e}, {worst}"
+
+    if balance.components:
+        yield "balance", f"of fluid, of the flow {closes(balance.circuit, balance.components)}"
+    if merged := sum(balance.merged.values()):
+        yield "merged", f"{QUANTITIES['volume'].show(merged, 'cm3', 3)} moved by events"
+    if (energy := balance.energy) is None:
+        return
+    yield "", f"of energy, of the power {closes(energy.circuit, energy.components)}"
+    said = [(energy.supplied, "supplied"), (sum(energy.dissipated.values()), "to heat"), (energy.stored, "stored")]
+    told = [f"{_joules(amount)} {what}" for amount, what in said]
+    if lost := sum(energy.at_events.values()):
+        told.append(f"of which {_joules(lost)} at events")
+    yield "energy", ", ".join(told)
+    if energy.silent:
+        more = len(energy.silent) - MAX_SILENT
+        names = ", ".join(energy.silent[:MAX_SILENT]) + (f" and {more} more" if more > 0 else "")
+        yield "", f"without {names}, which keep no books of energy"
+
+
+def _joules(amount: float) -> str:
+    """An energy in J or kJ."""
+    return QUANTITIES["energy"].show(amount, "kJ" if abs(amount) >= 1e3 else "J", 3)
 
 
 def figures(result: Result) -> list[tuple[str, ...]]:

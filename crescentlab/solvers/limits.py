@@ -6,6 +6,7 @@ import numpy as np
 
 from crescentlab import units
 from crescentlab.domain import HYDRAULIC
+from crescentlab.energy import fluids_asked
 from crescentlab.errors import SimulationError
 from crescentlab.system import System
 
@@ -28,8 +29,9 @@ class PressureLimits:
         for k, (name, quantity) in enumerate(zip(names, quantities, strict=True)):
             owner = name.rpartition(".")[0]
             hydraulic = any(p.domain is HYDRAULIC for p in type(plan.components[owner]).ports())
-            if quantity is units.pressure and hydraulic and plan.fluids[owner]:
-                fluid = plan.design.fluids[plan.fluids[owner][0]]
+            asked = fluids_asked(type(plan.components[owner]))
+            if quantity is units.pressure and hydraulic and asked:
+                fluid = plan.design.fluids[plan.fluids[owner][asked[0]]]
                 found.append((k, -fluid.atmospheric_pressure * (1 + 1e-9), name, fluid.tension))
         places, floors, shown, tension = zip(*found, strict=True) if found else ((), (), (), ())
         lowest = np.full(len(names), -np.inf)

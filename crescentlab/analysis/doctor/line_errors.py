@@ -70,7 +70,7 @@ def line_errors(result: Result, library: Library, period: float | None, bound: f
         if not frequencies.size:
             found.append(LineError(name, kind, frequencies, np.zeros(0), bound, "nothing oscillates in it"))
             continue
-        fluid = result.design.fluids[result.system.plan.fluids[name][0]]
+        fluid = result.design.fluids[result.system.plan.fluids[name]["fluid"]]
         form = _form(type(result.system.plan.components[name]), part)
         found.append(_judged(name, form, part, library, fluid, frequencies, ends, bound))
     return found

@@ -77,7 +77,7 @@ def exact_lines(design: Design, system: System, values: Values, at: Snapshot) ->
         ports = [p.name for p in type(part).ports() if p.domain is HYDRAULIC][:2]
         nets = [_net_of(design, name, port) for port in ports]
         line = ExactLine(
-            name, (ports[0], ports[1]), (nets[0], nets[1]), part, design.fluids[system.plan.fluids[name][0]]
+            name, (ports[0], ports[1]), (nets[0], nets[1]), part, design.fluids[system.plan.fluids[name]["fluid"]]
         )
         now = system.function_of([*line.pressures, *line.flows])(at.t, at.x, at.h, at.b, values.p)
         p_a, p_b, q_a, q_b = np.array(now).ravel().tolist()
@@ -124,7 +124,7 @@ def check_acting(lines: Sequence[ExactLine], model: LinearModel) -> None:
     """Refuse inputs that act inside a line, or on its fluid."""
     names = list(parameter_places(model.system, model.design))
     for line in lines:
-        fluid = model.system.plan.fluids[line.name][0]
+        fluid = model.system.plan.fluids[line.name]["fluid"]
         for u in model.inputs:
             acting = [names[k] for k, _ in u.direction if k < len(names)]
             if any(name.startswith((f"{line.name}.", f"{fluid}.")) for name in acting):
