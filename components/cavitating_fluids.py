@@ -11,7 +11,18 @@ from crescentlab.fluid import Fluid
 from crescentlab.maths import Expr, exp, log, sqrt
 from crescentlab.units import Density, KinematicViscosity, Pressure, PressureCoefficient, Ratio, Temperature
 
-from .fluid_laws import Law, absolute_pressure, evaporating, exponential_density, free_air, secant_density
+from .fluid_laws import (
+    Law,
+    absolute_pressure,
+    evaporating,
+    exponential_density,
+    free_air,
+    integrated_evaporating,
+    integrated_exponential_liquid,
+    integrated_free_air,
+    integrated_secant_liquid,
+    secant_density,
+)
 from .fluids import SimpleOil, saturated_too_early
 from .oil_grades import GRADES
 from .viscosity_laws import CST, barus_factor, walther_viscosity, wooster_coefficient
@@ -47,6 +58,10 @@ class _Evaporating(Fluid):
         """Relative density of the liquid [-] and its derivative [1/Pa]."""
         raise NotImplementedError
 
+    def _integrated_liquid(self, p: Expr) -> Any:
+        """Integral of the liquid's relative volume from 0 bar gauge [Pa]."""
+        raise NotImplementedError
+
     def _vapour(self) -> tuple[Any, Any]:
         """Vapour pressure [Pa, absolute] and density of the saturated vapour [kg/m^3]."""
         raise NotImplementedError
@@ -73,6 +88,22 @@ class _Evaporating(Fluid):
         volume, slope = self._specific_volume(p)
         beta: Expr = -volume / slope
         return beta
+
+    def enthalpy(self, p: Expr) -> Expr:
+        """w(p) [J/kg], the integral of dp/rho from 0 bar gauge."""
+        absolute, _ = absolute_pressure(p, self.atmospheric_pressure, self.minimum_pressure)
+        vapour_pressure, vapour_density = self._vapour()
+        condensable = integrated_evaporating(
+            p, absolute, lambda at: self._liquid(at)[0], self._integrated_liquid,
+            vapour_density / self._liquid_density(), vapour_pressure, self.vapour_range, self.atmospheric_pressure,
+            self.minimum_pressure,
+        )  # fmt: skip
+        air = integrated_free_air(
+            absolute, self.air_fraction, self.atmospheric_pressure, self.saturation_pressure, self.polytropic_index,
+            self.dissolution_rounding, self.minimum_pressure,
+        )  # fmt: skip
+        w: Expr = (condensable + air) / self._liquid_density()
+        return w
 
     def _specific_volume(self, p: Expr) -> Law:
         """rho_l/rho [-] and its derivative with respect to p [1/Pa]."""
@@ -114,6 +145,9 @@ class CavitatingOil(_Evaporating, SimpleOil):
 
     def _liquid(self, p: Expr) -> Law:
         return exponential_density(p, self.liquid_modulus)
+
+    def _integrated_liquid(self, p: Expr) -> Any:
+        return integrated_exponential_liquid(p, self.liquid_modulus)
 
     def _vapour(self) -> tuple[Any, Any]:
         return self.vapour_pressure, self.vapour_density
@@ -213,11 +247,17 @@ class MineralOil(_Evaporating, _DataSheet):
         return self.density_15 * exp(-expansion * (1 + 0.8 * expansion))
 
     def _liquid(self, p: Expr) -> Law:
-        modulus = self.liquid_modulus
-        if modulus is None:
-            thickness = log(self._viscosity_at(ZERO_CELSIUS + 20) / CST) / log(10.0)
-            modulus = 1e9 * (1.57 + 0.15 * thickness) * 10.0 ** (0.0024 * (ZERO_CELSIUS + 20 - self.temperature))
-        return secant_density(p, modulus, self.bulk_modulus_rise)
+        return secant_density(p, self._modulus(), self.bulk_modulus_rise)
+
+    def _integrated_liquid(self, p: Expr) -> Any:
+        return integrated_secant_liquid(p, self._modulus(), self.bulk_modulus_rise)
+
+    def _modulus(self) -> Any:
+        """K_0 [Pa]."""
+        if self.liquid_modulus is not None:
+            return self.liquid_modulus
+        thickness = log(self._viscosity_at(ZERO_CELSIUS + 20) / CST) / log(10.0)
+        return 1e9 * (1.57 + 0.15 * thickness) * 10.0 ** (0.0024 * (ZERO_CELSIUS + 20 - self.temperature))
 
     def _vapour(self) -> tuple[Any, Any]:
         return self.vapour_pressure, self.vapour_density
@@ -258,9 +298,16 @@ class Water(_Evaporating):
         return _polynomial(above, t) / (1 + 16.879850e-3 * t)
 
     def _liquid(self, p: Expr) -> Law:
+        return secant_density(p, self._modulus(), self.bulk_modulus_rise)
+
+    def _integrated_liquid(self, p: Expr) -> Any:
+        return integrated_secant_liquid(p, self._modulus(), self.bulk_modulus_rise)
+
+    def _modulus(self) -> Any:
+        """K_0 [Pa]."""
         t = self.temperature - ZERO_CELSIUS
         sound = _polynomial((1402.385, 5.038813, -5.799136e-2, 3.287156e-4, -1.398845e-6, 2.787860e-9), t)
-        return secant_density(p, self._liquid_density() * sound * sound, self.bulk_modulus_rise)
+        return self._liquid_density() * sound * sound
 
     def _vapour(self) -> tuple[Any, Any]:
         critical_temperature, critical_pressure = 647.096, 22.064e6

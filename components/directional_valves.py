@@ -8,12 +8,12 @@ from typing import Any
 from pydantic import BaseModel, Field
 
 from crescentlab.component import Component, Equations
-from crescentlab.domain import gives_signal, held, observable, state, takes_pressure, takes_signal
+from crescentlab.domain import dissipates, gives_signal, held, observable, state, takes_pressure, takes_signal
 from crescentlab.fluid import Fluid
 from crescentlab.maths import Expr, pi
-from crescentlab.units import Flow, Frequency, Ratio
+from crescentlab.units import Area, Flow, Frequency, Ratio
 
-from .valve_laws import Metering, edge_share, follower
+from .valve_laws import Metering, edge_share, follower, middle_share
 
 
 class Lapped(BaseModel):
@@ -49,6 +49,7 @@ class SpoolDrive(Component):
     position = state(Ratio, "stroke of the spool", start=0.0, nominal=1.0)
     rate = state(Frequency, "strokes per time", start=0.0, nominal=100.0)
     at = held(Ratio, "-1 rests at the low end, 1 at the high one, 0 free", start=0.0)
+    loss = dissipates()
 
     def equations(self, position: Expr, rate: Expr, at: Expr, command: Expr) -> Equations:
         omega = 2 * pi * self.natural_frequency
@@ -73,6 +74,7 @@ class TwoTwoValve(Metering, Lapped, Component):
     b = takes_pressure("outlet")
     stroke = takes_signal(Ratio, "0 is closed, 1 is open")
     q = observable(Flow, "flow from a to b")
+    loss = dissipates()
 
     def equations(self, p_a: Expr, p_b: Expr, stroke: Expr, fluid: Fluid) -> Equations:
         q = self.metered(p_a, p_b, self.opened(stroke), fluid)
@@ -97,6 +99,7 @@ class ThreeTwoValve(Metering, Lapped, Component):
     stroke = takes_signal(Ratio, "0 joins work port and tank, 1 supply and work port")
     q_in = observable(Flow, "flow from supply to work port")
     q_out = observable(Flow, "flow from work port to tank")
+    loss = dissipates()
 
     def equations(self, p_supply: Expr, p_work: Expr, p_tank: Expr, stroke: Expr, fluid: Fluid) -> Equations:
         y = 2 * stroke - 1
@@ -116,15 +119,19 @@ class FourThreeValve(Metering, Lapped, Component):
     `two_two_valve`; u = `overlap` [-] of the edges at P, u_T = `tank_overlap` [-] of those at T; A = `area` [m^2], at
     port B times `area_ratio` [-]; C_d [-] follows the flow number as there; \rho [kg/m^3] at the mean pressure. With a
     critical centre, equal edges and a load p_L = p_A - p_B on equal flows this is the textbook's q = C_d s A
-    sqrt((p_s - sign(x) p_L)/\rho) for p_T = 0. Overlapped edges make a closed centre, edges at T that
-    underlap alone a floating one, all four an open one. Not for a tandem centre, for leakage, nor for cavitating flow.
-    Source: H. E. Merritt, Hydraulic Control Systems (1967), chapter 5, four-way spool valve.
+    sqrt((p_s - sign(x) p_L)/\rho) for p_T = 0. The centre is closed for overlaps above 0; open (all ports joined) for
+    overlaps below 0; float (A and B to T, P closed) for `tank_overlap` alone below 0; P joined to A and B for `overlap`
+    alone below 0; tandem (P to T, A and B closed) for overlaps above 0 and a `tandem_area` A_PT [m^2], open by s_PT =
+    (c - |x|)/c [-] up to c = `tandem_stroke` [-], with corners as of the edges. Not for leakage, nor for cavitating
+    flow. Source: H. E. Merritt, Hydraulic Control Systems (1967), chapter 5, four-way spool valve; ISO 1219-1, centres.
     """
 
     tank_overlap: Ratio | None = Field(
         default=None, gt=-1, lt=1, description="overlap of the edges at the tank port; default: overlap"
     )
     area_ratio: Ratio = Field(default=1.0, gt=0, description="area of the edges at port B over that at port A")
+    tandem_area: Area = Field(default=0.0, ge=0, description="flow area from P to T in the middle; 0: no tandem centre")
+    tandem_stroke: Ratio = Field(default=0.1, gt=0, le=1, description="stroke at which P is parted from T again")
 
     supply = takes_pressure("supply port P")
     a = takes_pressure("work port A")
@@ -135,6 +142,8 @@ class FourThreeValve(Metering, Lapped, Component):
     q_supply_b = observable(Flow, "flow from P to B")
     q_a_tank = observable(Flow, "flow from A to T")
     q_b_tank = observable(Flow, "flow from B to T")
+    q_supply_tank = observable(Flow, "flow from P to T")
+    loss = dissipates()
 
     def equations(self, p_supply: Expr, p_a: Expr, p_b: Expr, p_tank: Expr, stroke: Expr, fluid: Fluid) -> Equations:
         tank_overlap = self.overlap if self.tank_overlap is None else self.tank_overlap
@@ -146,13 +155,16 @@ class FourThreeValve(Metering, Lapped, Component):
         p_to_b = self.metered(p_supply, p_b, self.area_ratio * self.opened(-stroke), fluid)
         a_to_t = self.metered(p_a, p_tank, returned(-stroke), fluid)
         b_to_t = self.metered(p_b, p_tank, self.area_ratio * returned(stroke), fluid)
+        middle = self.tandem_area * middle_share(stroke, self.tandem_stroke, self.edge_rounding)
+        p_to_t = self.through(p_supply, p_tank, middle, fluid)
         return {
-            "q_supply": p_to_a + p_to_b,
+            "q_supply": p_to_a + p_to_b + p_to_t,
             "q_a": a_to_t - p_to_a,
             "q_b": b_to_t - p_to_b,
-            "q_tank": -a_to_t - b_to_t,
+            "q_tank": -a_to_t - b_to_t - p_to_t,
             "q_supply_a": p_to_a,
             "q_supply_b": p_to_b,
             "q_a_tank": a_to_t,
             "q_b_tank": b_to_t,
+            "q_supply_tank": p_to_t,
         }

@@ -15,9 +15,9 @@ class _Rated(BaseModel):
     """Displacement and Wilson's coefficients, and the law they belong to."""
 
     displacement: Displacement = Field(gt=0, description="largest volume displaced per angle of the shaft")
-    leakage_coefficient: Ratio = Field(default=0.0, ge=0, description="C_s, laminar slip; 0 is none, typically 1e-9")
-    drag_coefficient: Ratio = Field(default=0.0, ge=0, description="C_d, viscous drag; 0 is none, typically 1e5")
-    friction_coefficient: Ratio = Field(default=0.0, ge=0, description="C_f, friction under pressure; typically 0.05")
+    leakage_coefficient: Ratio = Field(default=0.0, ge=0, description="C_s, laminar slip; 0 is none, typically 4e-9")
+    drag_coefficient: Ratio = Field(default=0.0, ge=0, description="C_d, viscous drag; 0 is none, typically 5e4")
+    friction_coefficient: Ratio = Field(default=0.0, ge=0, description="C_f, friction under pressure; 0.01 to 0.05")
     friction_torque: Torque = Field(default=0.0, ge=0, description="T_c, friction without pressure, as of seals")
     creep_speed: Speed = Field(default=1.0, gt=0, description="width of the rounding of friction at rest")
 

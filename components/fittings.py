@@ -67,7 +67,7 @@ def bend_loss(curvature: Any, angle: Any) -> Any:
               B_1 = 0.21\, (R/d)^{-1/2} \ (R \ge d)
 
     R/d = `curvature` [-], radius of the axis over the bore; \delta = `angle` [rad]; A_1 = 0.9 \sin\delta up to 70
-    degrees, 1 at 90, 0.7 + 0.35 \delta/90 from 100 degrees on, straight lines between. For Re from 3 10^5 on.
+    degrees, 1 at 90, 0.7 + 0.35 \delta/90 from 100 degrees on, straight lines between. For Re from 300 000 on.
     Source: I. E. Idelchik, Handbook of Hydraulic Resistance, diagram 6-1.
     """
     turned = where(angle < SHARP_TURN, 0.9 * sin(angle), table(angle, TURNS, TURN_FACTORS, flag_knots=False))
@@ -83,8 +83,8 @@ class Bend(Component):
     p [Pa] gauge, total; d = `diameter`, R = `radius` of the axis [m]; \delta = `angle` [rad]; A_1 [-] is 0.9 sin \delta
     up to 70 degrees, 1 at 90, 0.7 + 0.35 \delta/90 from 100 degrees on; f [-] Darcy factor of Churchill with
     `roughness`; v [m/s], \rho [kg/m^3], \nu [m^2/s] as in `pipe_resistance`. For R/d from 0.5 on, ten diameters of
-    straight pipe ahead of it, and Re from 3 10^5 on: left out is that the part of the curvature grows below, by the
-    diagram to twice A_1 B_1 at Re = 10^4, and by 600/Re to 6000/Re in laminar flow. Not for square corners (`elbow`).
+    straight pipe ahead of the bend, and Re from 300 000 on. Below, the diagram's A_1 B_1 grows, to twice at 10 000, and
+    has 600/Re to 6000/Re more in laminar flow: that is left out. Not for square corners (`elbow`).
     Source: I. E. Idelchik, Handbook of Hydraulic Resistance, diagram 6-1; S. W. Churchill (1977).
     """
 
@@ -154,8 +154,8 @@ class SuddenExpansion(Component):
 
     p [Pa] gauge, total: what the expansion wins back from the dynamic head is not in the drop; v [m/s], Re [-] in the
     narrow section A_1 of `narrow_diameter`; A_2 [m^2] of `wide_diameter`; K_1 = `laminar_coefficient` [-]; \rho
-    [kg/m^3], \nu [m^2/s] at the mean pressure. From Re = 10 to some 10^4 the diagrams' tables have more: a contraction
-    up to 1.7 times, an expansion up to 3 times at Re = 1000. Not for tapered pipes. Source: Borda-Carnot, from the
+    [kg/m^3], \nu [m^2/s] at the mean pressure. From Re = 10 to 5000 the diagrams' tables have more: a contraction up
+    to 1.7 times, an expansion up to 3 times, at Re = 1000. Not for tapered pipes. Source: Borda-Carnot, from the
     balance of momentum; contraction, and K_1 = 30 below Re = 10: I. E. Idelchik, Handbook of Hydraulic Resistance,
     diagrams 4-1, 4-9 and 4-10.
     """

@@ -186,7 +186,7 @@ def local_loss_velocity(p_a: Any, p_b: Any, diameter: Any, loss: Any, laminar: A
 
     \zeta = `loss` [-] at high Reynolds numbers; K_1 = `laminar` [-] > 0; d = `diameter` [m] where v is; \rho
     [kg/m^3], \nu [m^2/s] at the mean pressure. Source: W. B. Hooper, Chem. Eng. 88 (1981) 17, 96-100;
-    Altshul's form in I. E. Idelchik, Handbook of Hydraulic Resistance, section 1.
+    Altshul's form in I. E. Idelchik, Handbook of Hydraulic Resistance.
     """
     mean: Any = (p_a + p_b) / 2
     rho = fluid.density(mean)
@@ -247,8 +247,8 @@ def short_tube_flow(p_a: Any, p_b: Any, diameter: Any, length: Any, fluid: Fluid
     d = `diameter`, l = `length` [m]; v [m/s]; x = l/(d Re) [-]; C = 0.000212; \rho [kg/m^3], \nu [m^2/s] at the mean
     pressure. Merritt's two formulas, C_d = \xi^{-1/2} for x below and above 1/50, differ by 1.7 % there; Shah's weight
     w joins them and stays within 1.5 % of the flow of the one that holds. Solved by Newton's method on the logarithms.
-    Source: H. E. Merritt, Hydraulic Control Systems (1967), section 3-3, after Shapiro, Siegel & Kline (1954);
-    R. K. Shah, J. Fluids Eng. 100 (1978) 177-179.
+    Source: H. E. Merritt, Hydraulic Control Systems (1967), chapter 3, after Shapiro, Siegel & Kline (1954); R. K.
+    Shah, J. Fluids Eng. 100 (1978) 177-179.
     """
     mean: Any = (p_a + p_b) / 2
     drop = p_a - p_b
@@ -286,7 +286,7 @@ def radial_flow(p_a: Any, p_b: Any, inner: Any, outer: Any, height: Any, angle: 
 
     d_1 = `inner`, d_2 = `outer` diameter, h = `height` [m]; \alpha = `angle` [rad] of the sector, 2 \pi for a whole
     disc: \pi h^3 \Delta p/(6 \mu \ln(r_2/r_1)); \mu [Pa s] at the mean pressure. A negative height counts as zero.
-    Source: Poiseuille flow between parallel discs; H. E. Merritt, Hydraulic Control Systems (1967), section 3-2.
+    Source: Poiseuille flow between parallel discs; H. E. Merritt, Hydraulic Control Systems (1967), chapter 3.
     """
     mean: Any = (p_a + p_b) / 2
     open_height = maximum(height, 0.0)

@@ -12,7 +12,14 @@ from crescentlab.fluid import Fluid
 from crescentlab.maths import Expr, exp
 from crescentlab.units import Density, KinematicViscosity, Pressure, Ratio
 
-from .fluid_laws import Law, absolute_pressure, exponential_liquid, free_air
+from .fluid_laws import (
+    Law,
+    absolute_pressure,
+    exponential_liquid,
+    free_air,
+    integrated_exponential_liquid,
+    integrated_free_air,
+)
 
 
 def saturated_too_early(saturation_pressure: float, atmospheric_pressure: float) -> str:
@@ -49,6 +56,11 @@ class SimpleOil(Fluid):
     def kinematic_viscosity(self, p: Expr) -> Expr:
         """nu(p) [m^2/s]."""
         return self.viscosity + 0.0 * p
+
+    def enthalpy(self, p: Expr) -> Expr:
+        """w(p) [J/kg], the integral of dp/rho from 0 bar gauge."""
+        w: Expr = integrated_exponential_liquid(p, self.liquid_modulus) / self.liquid_density
+        return w
 
 
 class AeratedOil(Fluid):
@@ -102,6 +114,16 @@ class AeratedOil(Fluid):
     def kinematic_viscosity(self, p: Expr) -> Expr:
         """nu(p) [m^2/s]."""
         return self.viscosity + 0.0 * p
+
+    def enthalpy(self, p: Expr) -> Expr:
+        """w(p) [J/kg], the integral of dp/rho from 0 bar gauge."""
+        absolute, _ = absolute_pressure(p, self.atmospheric_pressure, self.minimum_pressure)
+        air = integrated_free_air(
+            absolute, self.air_fraction, self.atmospheric_pressure, self.saturation_pressure, self.polytropic_index,
+            self.dissolution_rounding, self.minimum_pressure,
+        )  # fmt: skip
+        w: Expr = (integrated_exponential_liquid(p, self.liquid_modulus) + air) / self.liquid_density
+        return w
 
     def _specific_volume(self, p: Expr) -> Law:
         """rho_l/rho [-] and its derivative with respect to p [1/Pa]."""

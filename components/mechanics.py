@@ -250,7 +250,7 @@ class FrictionBetween(Component):
     v_s = `stribeck_velocity`, v_t = `creep_velocity` [m/s], below which the friction falls to zero with the velocity;
     B = `viscous_friction` [N s/m]. Not for parts that stand still under load: they creep at up to v_t; exact sticking
     against the ground is `stick_slip_mass`. Source: B. Armstrong-Helouvry, P. Dupont, C. Canudas de Wit, Automatica 30
-    (1994) 1083-1138, section 2; rounded at rest by a hyperbolic tangent.
+    (1994) 1083-1138; rounded at rest by a hyperbolic tangent.
     """
 
     coulomb_friction: Force = Field(ge=0, description="friction force while sliding")

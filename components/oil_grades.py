@@ -21,6 +21,7 @@ GRADES = {
     "SAE 15W-40": Grade(883.0, 109 * CST, 14.7 * CST),
     "ATF": Grade(865.0, 34 * CST, 7.2 * CST),
 }
-"""ISO VG: hydraulic oils HLP (HM), viscosity index 97 to 99, as makers state them (Shell Tellus S2 M); ISO 3448 allows
-10 % about the number at 40 degC. SAE 15W-40: a diesel engine oil of viscosity index 139 (Shell Rimula R4 X); SAE J300
-asks for 12.5 to 16.3 cSt at 100 degC. ATF: a Dexron III fluid of viscosity index 183."""
+"""Typical, not those of one maker. ISO VG: hydraulic oils HLP (HM) of viscosity index 97 to 102; ISO 3448 allows 10 %
+about the number at 40 degC. SAE 15W-40: a diesel engine oil of index 139; SAE J300 asks for 12.5 to 16.3 cSt at 100
+degC (Mobil Delvac MX: 117 and 15.5 cSt, index 140, 880 kg/m^3). ATF: a Dexron III fluid of index 183 (Mobil
+Multipurpose ATF: 36.3 and 7.4 cSt, 176, 846 kg/m^3; Mobil ATF 220, Dexron II: 37 and 7.0 cSt, 153, 870 kg/m^3)."""

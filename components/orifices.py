@@ -99,12 +99,12 @@ class LaminarTurbulentOrifice(Component):
     \Delta p = p_a - p_b [Pa]; v = q/(n A) [m/s]; A = `area` [m^2]; n = `parallel` [-]; C_d = `cd_turbulent` [-];
     \delta = `laminar_coefficient` [-], 0.157 for slits and 0.2 for round holes by Wuest; exact creeping flow through a
     hole in a thin plate has 0.163, two thirds of that flow (Sampson); d_h [m], by default \sqrt{4A/\pi + d_r^2} with
-    d_r = `diameter_rounding` [m]; \rho [kg/m^3], \nu [m^2/s] at the mean pressure. Its ends are
-    the laminar q = 2 \delta^2 d_h A \Delta p/\mu and the turbulent C_d A \sqrt{2\Delta p/\rho}; at the transition
-    Reynolds number Re_t, 9.3 for \delta = 0.2, both parts of the drop are equal. Not for cavitating flow. Source: H. E.
-    Merritt, Hydraulic Control Systems (1967), chapter 3, after W. Wuest, Ingenieur-Archiv 22 (1954) 357-367; R. A.
-    Sampson, Phil. Trans. R. Soc. A 182 (1891) 449-518; joined smoothly, linear at zero drop, after W. Borutzky, B.
-    Barnard, J. Thoma, Simulation Modelling Practice and Theory 10 (2002) 141-152.
+    d_r = `diameter_rounding` [m]; \rho [kg/m^3], \nu [m^2/s] at the mean pressure. Its ends are the laminar
+    q = 2 \delta^2 d_h A \Delta p/\mu and the turbulent C_d A \sqrt{2\Delta p/\rho}; at the transition Reynolds number
+    Re_t, 9.3 for \delta = 0.2, both parts of the drop are equal. Not for cavitating flow. Source: H. E. Merritt,
+    Hydraulic Control Systems (1967), chapter 3, after W. Wuest, Ing.-Archiv 22 (1954) 357-367; R. A. Sampson, Phil.
+    Trans. R. Soc. A 182 (1891) 449-518; joined smoothly, linear at zero drop, after W. Borutzky, B. Barnard, J. Thoma,
+    Simulation Modelling Practice and Theory 10 (2002) 141-152.
     """
 
     area: Area = Field(ge=0, description="flow area; 0 is closed")

@@ -1,6 +1,6 @@
 """Pistons that shape a chamber: motion on one side, the volume of a `variable_capacity` on the other."""
 
-from typing import Literal
+from typing import ClassVar, Literal
 
 from pydantic import Field
 
@@ -20,10 +20,12 @@ class PistonChamber(Component):
 
     V [m^3] volume of the chamber; V_0 = `dead_volume` [m^3] at x = 0; x [m], v [m/s] of the rod; p [Pa, gauge] of
     the chamber; F [N] on the rod, + where the pressure `pushes_up`, towards increasing x (the net's force on the
-    piston is -F); d, d_r [m] diameters of piston and rod. The run ends when the stroke uses the chamber up. Not for
-    the leakage past the piston: join a gap between the nets.
-    Source: geometry; H. E. Merritt, Hydraulic Control Systems (1967), section 6.
+    piston is -F); d, d_r [m] diameters of piston and rod. The run ends when the stroke uses the chamber up. No
+    power is lost or stored. Not for the leakage past the piston: join a gap between the nets.
+    Source: geometry; H. E. Merritt, Hydraulic Control Systems (1967), chapter 6.
     """
+
+    lossless: ClassVar[bool] = True
 
     diameter: Length = Field(gt=0, description="diameter of the piston")
     rod_diameter: Length = Field(default=0.0, ge=0, description="diameter of a rod on the side of the chamber")

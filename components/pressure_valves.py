@@ -9,7 +9,7 @@ from typing import Any
 from pydantic import BaseModel, Field
 
 from crescentlab.component import Component, Equations
-from crescentlab.domain import held, observable, reads_pressure, state, takes_pressure
+from crescentlab.domain import dissipates, held, observable, reads_pressure, state, takes_pressure
 from crescentlab.fluid import Fluid
 from crescentlab.maths import Expr, maximum, pi
 from crescentlab.units import Flow, Frequency, Pressure, Ratio, Time
@@ -48,6 +48,7 @@ class ReliefValve(Lagging, Metering, Component):
     b = takes_pressure("outlet")
     lift = state(Ratio, "share of the full opening", start=0.0, nominal=1.0)
     q = observable(Flow, "flow from a to b")
+    loss = dissipates()
 
     def equations(self, p_a: Expr, p_b: Expr, lift: Expr, fluid: Fluid) -> Equations:
         target = clipped((p_a - p_b - self.cracking_pressure) / self.opening_range)
@@ -81,6 +82,7 @@ class SecondOrderReliefValve(Metering, Component):
     rate = state(Frequency, "openings per time", start=0.0, nominal=100.0)
     at = held(Ratio, "-1 rests on the seat, 1 on the stop, 0 free", start=0.0)
     q = observable(Flow, "flow from a to b")
+    loss = dissipates()
 
     def equations(self, p_a: Expr, p_b: Expr, position: Expr, rate: Expr, at: Expr, fluid: Fluid) -> Equations:
         target = (p_a - p_b - self.cracking_pressure) / self.opening_range
@@ -111,6 +113,7 @@ class ReducingValve(Lagging, Metering, Component):
     drain = reads_pressure("drain of the spring chamber")
     lift = state(Ratio, "share of the full opening", start=1.0, nominal=1.0)
     q = observable(Flow, "flow from a to b")
+    loss = dissipates()
 
     def equations(self, p_a: Expr, p_b: Expr, p_drain: Expr, lift: Expr, fluid: Fluid) -> Equations:
         target = clipped((self.set_pressure - (p_b - p_drain)) / self.closing_range)
@@ -141,6 +144,7 @@ class ReducingRelievingValve(Lagging, Metering, Component):
     stroke = state(Ratio, "1 fully open to the supply, -1 to the tank", start=0.0, nominal=1.0)
     q_in = observable(Flow, "flow from the supply to the outlet")
     q_out = observable(Flow, "flow from the outlet to the tank")
+    loss = dissipates()
 
     def equations(self, p_supply: Expr, p_outlet: Expr, p_tank: Expr, stroke: Expr, fluid: Fluid) -> Equations:
         missing = self.set_pressure - (p_outlet - p_tank)
@@ -156,6 +160,38 @@ class ReducingRelievingValve(Lagging, Metering, Component):
             "q_out": out,
             "der_stroke": self.lag(feeds - relieves, stroke),
         }
+
+
+class SequenceValve(Lagging, Metering, Component):
+    r"""Sequence valve: passes fluid on once its inlet, or a pilot line, has reached the set pressure.
+
+    .. math:: q = C_d\, s A \sqrt{2|\Delta p|/\rho}\, \mathrm{sign}\,\Delta p, \quad
+              T \frac{ds}{dt} = \min(\max((p_x - p_d - p_c)/p_r, 0), 1) - s
+
+    \Delta p = p_a - p_b [Pa]; p_x [Pa] of the pilot, which is joined to the inlet's net (internal pilot) or to another
+    line (external); p_d [Pa] of the drain behind the spring, so that the outlet's pressure does not matter; p_c =
+    `set_pressure` from which it opens, p_r = `opening_range` [Pa]; s = `lift` [-]; A = `area` [m^2]; T =
+    `time_constant` [s]; C_d [-] follows the flow number as in `orifice`; \rho [kg/m^3] at the mean pressure. Pilot and
+    drain take no fluid. Flow back needs a `check_valve` beside it. Not for a spring chamber that is drained to the
+    outlet (`relief_valve`), flow forces, nor leakage. Piloted from a pump's other line it unloads that pump.
+    Source: balance of forces on a spool with a linear spring; ISO 1219-1, sequence valve with external drain.
+    """
+
+    set_pressure: Pressure = Field(gt=0, description="pilot's pressure over the drain's at which it starts to open")
+    opening_range: Pressure = Field(gt=0, description="further pressure until it is fully open")
+
+    a = takes_pressure("inlet")
+    b = takes_pressure("outlet, to what comes next")
+    pilot = reads_pressure("what opens it: the inlet's net, or another line")
+    drain = reads_pressure("drain of the spring chamber")
+    lift = state(Ratio, "share of the full opening", start=0.0, nominal=1.0)
+    q = observable(Flow, "flow from a to b")
+    loss = dissipates()
+
+    def equations(self, p_a: Expr, p_b: Expr, p_pilot: Expr, p_drain: Expr, lift: Expr, fluid: Fluid) -> Equations:
+        target = clipped((p_pilot - p_drain - self.set_pressure) / self.opening_range)
+        q = self.metered(p_a, p_b, lift, fluid)
+        return {"q_a": q, "q_b": -q, "q": q, "der_lift": self.lag(target, lift)}
 
 
 class CounterbalanceValve(Lagging, Metering, Component):
@@ -183,6 +219,7 @@ class CounterbalanceValve(Lagging, Metering, Component):
     pilot = reads_pressure("pilot port X: the other side of the load")
     lift = state(Ratio, "share of the full opening", start=0.0, nominal=1.0)
     q = observable(Flow, "flow from a to b")
+    loss = dissipates()
 
     def equations(self, p_a: Expr, p_b: Expr, p_pilot: Expr, lift: Expr, fluid: Fluid) -> Equations:
         back = 0.0 if self.vented else (1 + self.pilot_ratio) * p_b
@@ -200,8 +237,8 @@ class PressureCompensator(Lagging, Metering, Component):
     \Delta p = p_a - p_b [Pa]; p_b - p_l [Pa] the drop over the metering edge between the outlet b and the load l; p_c =
     `control_pressure` at which it begins to close, p_r = `closing_range` [Pa] until it is closed; s = `lift` [-];
     A = `area` [m^2]; T = `time_constant` [s]; C_d [-] follows the flow number as in `orifice`; \rho [kg/m^3] at the
-    mean pressure. It starts open. The load port takes no fluid. Not for a bypass compensator (three-way flow control),
-    nor for flow forces.
+    mean pressure. It starts open. The load port takes no fluid. Not for sending a surplus to the tank
+    (`bypass_compensator`), nor for flow forces.
     Source: H. E. Merritt, Hydraulic Control Systems (1967), chapter 5; balance of forces on a spool with a spring.
     """
 
@@ -213,8 +250,40 @@ class PressureCompensator(Lagging, Metering, Component):
     load = reads_pressure("behind the metering edge")
     lift = state(Ratio, "share of the full opening", start=1.0, nominal=1.0)
     q = observable(Flow, "flow from a to b")
+    loss = dissipates()
 
     def equations(self, p_a: Expr, p_b: Expr, p_load: Expr, lift: Expr, fluid: Fluid) -> Equations:
         excess = p_b - p_load - self.control_pressure
         q = self.metered(p_a, p_b, lift, fluid)
         return {"q_a": q, "q_b": -q, "q": q, "der_lift": self.lag(1 - clipped(excess / self.closing_range), lift)}
+
+
+class BypassCompensator(Lagging, Metering, Component):
+    r"""Bypass compensator: keeps the drop over a metering edge constant by sending the surplus to the tank.
+
+    .. math:: q = C_d\, s A \sqrt{2|\Delta p|/\rho}\, \mathrm{sign}\,\Delta p, \quad
+              T \frac{ds}{dt} = \min(\max((p_a - p_l - p_c)/p_r, 0), 1) - s
+
+    \Delta p = p_a - p_b [Pa]; p_a - p_l [Pa] the drop over the metering edge between the inlet a, at the pump, and the
+    load l; p_c = `control_pressure` at which it begins to open, p_r = `opening_range` [Pa]; s = `lift` [-]; A = `area`
+    [m^2]; T = `time_constant` [s]; C_d [-] follows the flow number as in `orifice`; \rho [kg/m^3] at the mean pressure.
+    With an `orifice` from a to l it is the three-way flow control, with a proportional valve the load-sensing inlet of
+    a constant pump, which then works p_c to p_c + p_r above the load. The load port takes no fluid. Not for several
+    such valves on one pump, a limit of the load's pressure (a `relief_valve` beside it), nor for flow forces.
+    Source: balance of forces on a spool with a linear spring; ISO 1219-1, three-way flow control valve.
+    """
+
+    control_pressure: Pressure = Field(gt=0, description="drop over the metering edge at which it begins to open")
+    opening_range: Pressure = Field(gt=0, description="further drop until it is fully open")
+
+    a = takes_pressure("inlet, before the metering edge")
+    b = takes_pressure("bypass, to the tank")
+    load = reads_pressure("behind the metering edge")
+    lift = state(Ratio, "share of the full opening", start=0.0, nominal=1.0)
+    q = observable(Flow, "flow from a to b")
+    loss = dissipates()
+
+    def equations(self, p_a: Expr, p_b: Expr, p_load: Expr, lift: Expr, fluid: Fluid) -> Equations:
+        target = clipped((p_a - p_load - self.control_pressure) / self.opening_range)
+        q = self.metered(p_a, p_b, lift, fluid)
+        return {"q_a": q, "q_b": -q, "q": q, "der_lift": self.lag(target, lift)}

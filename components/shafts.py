@@ -180,7 +180,7 @@ class RotaryFriction(Component):
     T [N m] on the rotor, against its speed \omega [rad/s]; T_c = `coulomb_friction`, T_s = `static_friction` [N m];
     \omega_s = `stribeck_speed`, \omega_t = `creep_speed` [rad/s], below which the friction falls to zero with the
     speed; d = `viscous_friction` [N m s/rad]. Not for a rotor held still under load: it creeps at up to \omega_t.
-    Source: B. Armstrong-Helouvry, P. Dupont, C. Canudas de Wit, Automatica 30 (1994) 1083-1138, section 2; rounded at
+    Source: B. Armstrong-Helouvry, P. Dupont, C. Canudas de Wit, Automatica 30 (1994) 1083-1138; rounded at
     rest by a hyperbolic tangent.
     """
 

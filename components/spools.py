@@ -3,54 +3,15 @@
 Round holes, the ends of a spool and its leaking lands are in `valve_parts`. Join the parts on the rod of a mass.
 """
 
-from dataclasses import dataclass
-from typing import Any
-
 from pydantic import Field
 
 from crescentlab.component import Component, Equations
-from crescentlab.domain import observable, takes_motion, takes_pressure
+from crescentlab.domain import dissipates, observable, takes_motion, takes_pressure
 from crescentlab.fluid import Fluid
-from crescentlab.maths import Expr, cos, pi, sin, tan
+from crescentlab.maths import Expr, pi, sin, tan
 from crescentlab.units import Angle, Area, Flow, Force, Length
 
-from .valve_laws import Direction, SpoolEdge, limited, opening
-
-
-@dataclass(frozen=True)
-class _Uncovered:
-    """What an edge has uncovered."""
-
-    area: Any
-    """[m^2]."""
-    slope: Any
-    """Of the area over the opening [m]."""
-    hydraulic_diameter: Any
-    """4 area/perimeter [m]."""
-
-
-def _sign(opens: Direction) -> float:
-    return 1.0 if opens == "up" else -1.0
-
-
-def _travel(edge: SpoolEdge, x_rod: Any) -> tuple[Any, Any]:
-    """Opening [m] of an edge and its slope over the travel [-]."""
-    return opening(_sign(edge.opens) * x_rod - edge.overlap, edge.edge_rounding)
-
-
-def _equations(edge: SpoolEdge, uncovered: _Uncovered, p_a: Any, p_b: Any, v_rod: Any, fluid: Fluid) -> Equations:
-    """What every edge returns, from what it has uncovered."""
-    issue = edge.jet(p_a, p_b, uncovered.area, uncovered.hydraulic_diameter, cos(edge.jet_angle), fluid)
-    transient = edge.damping_length * issue.mass_flux * uncovered.slope * v_rod
-    return {
-        "q_a": issue.q,
-        "q_b": -issue.q,
-        "f_rod": _sign(edge.opens) * issue.force + transient,
-        "q": issue.q,
-        "area": uncovered.area,
-        "jet_force": issue.force,
-        "transient_force": transient,
-    }
+from .valve_laws import SpoolEdge, Uncovered, limited, opening
 
 
 class AnnularPort(SpoolEdge, Component):
@@ -79,11 +40,12 @@ class AnnularPort(SpoolEdge, Component):
     area = observable(Area, "open area")
     jet_force = observable(Force, "steady flow force, positive towards closing")
     transient_force = observable(Force, "transient flow force, positive towards decreasing x")
+    loss = dissipates()
 
     def equations(self, p_a: Expr, p_b: Expr, x_rod: Expr, v_rod: Expr, fluid: Fluid) -> Equations:
-        h, slope = _travel(self, x_rod)
+        h, slope = opening(self.travel(x_rod), self.edge_rounding)
         width = pi * self.diameter
-        return _equations(self, _Uncovered(width * h, width * slope, 2 * h), p_a, p_b, v_rod, fluid)
+        return self.issued(Uncovered(width * h, width * slope, 2 * h), p_a, p_b, v_rod, fluid)
 
 
 class RectangularSlots(SpoolEdge, Component):
@@ -109,12 +71,13 @@ class RectangularSlots(SpoolEdge, Component):
     area = observable(Area, "open area of all slots")
     jet_force = observable(Force, "steady flow force, positive towards closing")
     transient_force = observable(Force, "transient flow force, positive towards decreasing x")
+    loss = dissipates()
 
     def equations(self, p_a: Expr, p_b: Expr, x_rod: Expr, v_rod: Expr, fluid: Fluid) -> Equations:
-        h, slope = limited(*_travel(self, x_rod), self.length)
+        h, slope = limited(*opening(self.travel(x_rod), self.edge_rounding), self.length)
         all_wide = self.number * self.width
         d_h = 2 * self.width * h / (self.width + h)
-        return _equations(self, _Uncovered(all_wide * h, all_wide * slope, d_h), p_a, p_b, v_rod, fluid)
+        return self.issued(Uncovered(all_wide * h, all_wide * slope, d_h), p_a, p_b, v_rod, fluid)
 
 
 class TriangularNotches(SpoolEdge, Component):
@@ -141,9 +104,10 @@ class TriangularNotches(SpoolEdge, Component):
     area = observable(Area, "open area of all notches")
     jet_force = observable(Force, "steady flow force, positive towards closing")
     transient_force = observable(Force, "transient flow force, positive towards decreasing x")
+    loss = dissipates()
 
     def equations(self, p_a: Expr, p_b: Expr, x_rod: Expr, v_rod: Expr, fluid: Fluid) -> Equations:
-        h, slope = limited(*_travel(self, x_rod), self.length)
+        h, slope = limited(*opening(self.travel(x_rod), self.edge_rounding), self.length)
         wide, s = self.number * tan(self.angle / 2), sin(self.angle / 2)
-        uncovered = _Uncovered(wide * h * h, 2 * wide * h * slope, 2 * h * s / (1 + s))
-        return _equations(self, uncovered, p_a, p_b, v_rod, fluid)
+        uncovered = Uncovered(wide * h * h, 2 * wide * h * slope, 2 * h * s / (1 + s))
+        return self.issued(uncovered, p_a, p_b, v_rod, fluid)

@@ -9,7 +9,7 @@ from typing import Any, Literal
 from pydantic import BaseModel, Field
 
 from crescentlab.fluid import Fluid
-from crescentlab.maths import hypot, maximum, minimum, pi, sqrt, when, where
+from crescentlab.maths import cos, hypot, maximum, minimum, pi, sqrt, when, where
 from crescentlab.units import Angle, Area, Length, Pressure, Ratio
 
 from .flow_laws import DIAMETER_ROUNDING, hydraulic_diameter_of, orifice_flow
@@ -28,7 +28,10 @@ class Metering(BaseModel):
 
     def metered(self, p_a: Any, p_b: Any, share: Any, fluid: Fluid) -> Any:
         """Flow [m^3/s] from a to b through `share` [-] of the area, below 0 counted as 0."""
-        area = self.area * maximum(share, 0.0)
+        return self.through(p_a, p_b, self.area * maximum(share, 0.0), fluid)
+
+    def through(self, p_a: Any, p_b: Any, area: Any, fluid: Fluid) -> Any:
+        """Flow [m^3/s] from a to b through an area [m^2] of the same kind of edge."""
         d_h = hydraulic_diameter_of(area, self.diameter_rounding)
         return orifice_flow(p_a, p_b, area, d_h, self.cd_max, self.lambda_c, fluid)
 
@@ -68,6 +71,18 @@ class Issue:
     """Mass flow per uncovered area [kg/(s m^2)], of the sign of q."""
 
 
+@dataclass(frozen=True)
+class Uncovered:
+    """What the edge of a spool has uncovered."""
+
+    area: Any
+    """[m^2]."""
+    slope: Any
+    """Of the area over the travel [m]."""
+    hydraulic_diameter: Any
+    """4 area/perimeter [m]."""
+
+
 class SpoolEdge(Jet):
     """What the edge of a spool is described by, besides the shape of what it uncovers."""
 
@@ -80,6 +95,34 @@ class SpoolEdge(Jet):
     damping_length: Length = Field(
         default=0.0, description="from the edge to the other port, counted into side a; below 0 into side b"
     )
+
+    @property
+    def towards(self) -> float:
+        """1 for an edge that opens towards increasing x, -1 for the other."""
+        return 1.0 if self.opens == "up" else -1.0
+
+    def travel(self, x_rod: Any) -> Any:
+        """Travel [m] from where the edge starts to open."""
+        return self.towards * x_rod - self.overlap
+
+    def issued(self, uncovered: Uncovered, p_a: Any, p_b: Any, v_rod: Any, fluid: Fluid) -> dict[str, Any]:
+        r"""What every edge returns, from what it has uncovered.
+
+        .. math:: F_t = L \rho \frac{q}{A} \frac{dA}{dx} v
+
+        F_t [N] the transient flow force; L = `damping_length` [m]; v = `v_rod` [m/s]; q/A goes on where A is 0.
+        """
+        issue = self.jet(p_a, p_b, uncovered.area, uncovered.hydraulic_diameter, cos(self.jet_angle), fluid)
+        transient = self.damping_length * issue.mass_flux * uncovered.slope * v_rod
+        return {
+            "q_a": issue.q,
+            "q_b": -issue.q,
+            "f_rod": self.towards * issue.force + transient,
+            "q": issue.q,
+            "area": uncovered.area,
+            "jet_force": issue.force,
+            "transient_force": transient,
+        }
 
 
 def opening(travel: Any, rounding: Any) -> tuple[Any, Any]:
@@ -107,12 +150,29 @@ def edge_share(stroke: Any, overlap: Any, rounding: Any) -> Any:
 
     u = `overlap`, w = `rounding` > 0, both as shares of the stroke; s is 1 at full stroke, x = 1.
     """
-    y = minimum(maximum(stroke, -1.0), 1.0) - overlap
-    round_part = minimum(maximum(y + rounding, 0.0), 2 * rounding)
-    return (round_part * round_part / (4 * rounding) + maximum(y - rounding, 0.0)) / (1 - overlap)
+    return _rounded(clipped(stroke, -1.0) - overlap, rounding) / (1 - overlap)
 
 
-def clipped(value: Any, low: float = 0.0, high: float = 1.0) -> Any:
+def middle_share(stroke: Any, closed: Any, rounding: Any) -> Any:
+    r"""Open share [-] of an edge that is open in the middle of the stroke, x = 0, and closes to both sides.
+
+    .. math:: s = \frac{c - |x|}{c} \quad (|x| < c), \qquad s = 0 \quad (|x| \ge c)
+
+    c = `closed`; both corners, in the middle and at c, are rounded within w = `rounding` > 0 as in :func:`edge_share`,
+    and s is 1 in the middle. All as shares of the stroke.
+    """
+    x = clipped(stroke, -1.0)
+    away = _rounded(x, rounding) + _rounded(-x, rounding)
+    return _rounded(closed - away, rounding) / _rounded(closed - rounding / 2, rounding)
+
+
+def _rounded(y: Any, w: Any) -> Any:
+    """The larger of y and 0, its corner replaced by (y + w)^2/(4 w) within w."""
+    bend = clipped(y + w, 0.0, 2 * w)
+    return bend * bend / (4 * w) + maximum(y - w, 0.0)
+
+
+def clipped(value: Any, low: float = 0.0, high: Any = 1.0) -> Any:
     """`value` within low and high."""
     return minimum(maximum(value, low), high)
 

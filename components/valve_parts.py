@@ -5,12 +5,21 @@ from typing import Any, Literal, Self
 from pydantic import Field, model_validator
 
 from crescentlab.component import Component, Equations
-from crescentlab.domain import gives_signal, observable, takes_motion, takes_pressure, takes_signal
+from crescentlab.domain import (
+    dissipates,
+    gives_signal,
+    observable,
+    supplies,
+    takes_motion,
+    takes_pressure,
+    takes_signal,
+)
 from crescentlab.fluid import Fluid
-from crescentlab.maths import Expr, acos, cos, hypot, maximum, minimum, pi, sqrt
-from crescentlab.units import Angle, Area, Flow, FlowResistance, Force, Length, Pressure, QuadraticResistance, Ratio
+from crescentlab.maths import Expr, acos, maximum, minimum, pi, sqrt
+from crescentlab.units import Area, Flow, FlowResistance, Force, Length, Pressure, QuadraticResistance, Ratio
 
-from .flow_laws import annular_flow, drag_flow, orifice_flow
+from .flow_laws import annular_flow, drag_flow
+from .valve_laws import SpoolEdge, Uncovered
 
 Side = Literal["pushes_up", "pushes_down"]
 """Whether the pressure on a face pushes the spool towards increasing x or decreasing x."""
@@ -43,6 +52,23 @@ def circle_segment(height: Any, diameter: Any, rounding: Any) -> tuple[Any, Any]
     return area, 4 * area / perimeter
 
 
+def circle_chord(height: Any, diameter: Any, rounding: Any) -> Any:
+    r"""Slope [m] of the area of :func:`circle_segment` over `height` [m]: the edge's length within the circle.
+
+    .. math:: \frac{dA}{dh} = 2 \sqrt{h (d - h)}
+
+    d = `diameter` [m]; 0 at h = 0 and h = d. Over the first and last `rounding` w [m] it is the chord at w times 2 s -
+    s^2, s = h/w, which is the area's slope there but for a share of w/(5 d).
+    """
+    inner = minimum(maximum(height, rounding), diameter - rounding)
+
+    def share(h: Any) -> Any:
+        s = minimum(maximum(h / rounding, 0.0), 1.0)
+        return s * (2 - s)
+
+    return 2 * sqrt(inner * (diameter - inner)) * share(height) * share(diameter - height)
+
+
 def _up(side: Side) -> float:
     return 1.0 if side == "pushes_up" else -1.0
 
@@ -64,6 +90,7 @@ class SpoolEnd(Component):
     port = takes_pressure("pressure on the face")
     rod = takes_motion("the spool")
     force = observable(Force, "pressure force on the spool, positive towards increasing x")
+    loss = dissipates()
 
     @model_validator(mode="after")
     def _face_has_area(self) -> Self:
@@ -99,6 +126,7 @@ class SpringChamberEnd(Component):
     port = takes_pressure("where the displaced fluid goes")
     rod = takes_motion("the spool")
     force = observable(Force, "pressure force on the spool, positive towards increasing x")
+    supply = supplies("power that the given pressure takes from or adds to the fluid")
 
     def equations(self, pressure: Expr, p_port: Expr, v_rod: Expr, fluid: Fluid) -> Equations:
         area = _up(self.side) * pi / 4 * self.diameter**2
@@ -106,48 +134,45 @@ class SpringChamberEnd(Component):
         return {"q_port": fluid.density(p_port) / fluid.rho_0 * area * v_rod, "f_rod": -force, "force": force}
 
 
-class RoundHoles(Component):
-    r"""Round holes uncovered by the edge of a spool, with the flow force that closes them.
+class RoundHoles(SpoolEdge, Component):
+    r"""Round holes uncovered by the edge of a spool, with its steady and transient flow forces.
 
     .. math:: q = n C_d A \sqrt{2|\Delta p|/\rho}\, \mathrm{sign}\,\Delta p, \quad
-              F_{jet} = k \rho |q| v_{jet} \cos\vartheta, \quad v_{jet} = \sqrt{2|\Delta p|/\rho}
+              F_{jet} = k \rho |q| v_{jet} \cos\vartheta, \quad v_{jet} = \sqrt{2|\Delta p|/\rho}, \quad
+              F_t = L \rho \frac{q}{A} \frac{dA}{dx} v, \quad \frac{dA}{dx} = 2 \sqrt{h (d - h)}
 
-    \Delta p = p_a - p_b [Pa]; n = `number`; A [m^2] the segment of one hole uncovered up to x - `overlap`, x [m];
-    C_d(\lambda) = `cd_max` tanh(2\lambda/`lambda_c`) with the hydraulic diameter 4 A/perimeter of one segment [m];
-    \rho [kg/m^3], \nu [m^2/s] at the mean pressure; \vartheta = `jet_angle` [rad] to the spool's axis;
-    k = `jet_coefficient` [-]. F_jet [N] acts towards decreasing x whichever way the fluid flows; v_jet [m/s] is
-    rounded within `drop_rounding` [Pa] of zero drop. Holes are closed for x <= overlap and fully open from
-    x = overlap + `diameter` on. Not for cavitating flow, nor for an axial inlet's momentum (lower k instead).
-    Source: Rundo & Corvaglia (2016), Eqs. 27-29 and 31.
+    \Delta p = p_a - p_b [Pa]; n = `number`; A [m^2] the segment of one hole of d = `diameter` [m] uncovered up to
+    h = \pm x - `overlap` [m], x [m], + for `opens` up; C_d(\lambda) = `cd_max` tanh(2\lambda/`lambda_c`) with the
+    hydraulic diameter 4 A/perimeter of one segment [m]; \rho [kg/m^3], \nu [m^2/s] at the mean pressure; \vartheta =
+    `jet_angle` [rad] to the spool's axis; k = `jet_coefficient` [-]. F_jet [N] closes whichever way the fluid flows;
+    v_jet is rounded within `drop_rounding` [Pa] of zero drop. F_t [N] acts against v [m/s] of the rod where the fluid
+    flows from a to b, L = `damping_length` [m] as in `annular_port`; its part with dp/dt is left out. Closed for h <=
+    0; fully open, without F_t, for h >= d. Not for cavitating flow, nor for an axial inlet's momentum (lower k).
+    Source: Rundo & Corvaglia (2016), Eqs. 27-29 and 31; H. E. Merritt, Hydraulic Control Systems (1967), chapter 5,
+    flow forces on spool valves.
     """
 
     number: int = Field(default=1, ge=1, description="number of holes")
     diameter: Length = Field(gt=0, description="diameter of a hole")
-    overlap: Length = Field(default=0.0, description="position at which the holes start to open")
-    cd_max: Ratio = Field(default=0.7, gt=0, le=1, description="largest discharge coefficient")
-    lambda_c: Ratio = Field(default=100.0, gt=0, description="critical flow number")
-    jet_angle: Angle = Field(default=69 * pi / 180, ge=0, le=pi / 2, description="angle of the jet to the spool's axis")
-    jet_coefficient: Ratio = Field(default=1.0, ge=0, description="correction of the flow force; 0 is none")
     edge_rounding: Length = Field(default=1e-6, gt=0, description="rounding of a hole's area where it starts or ends")
-    drop_rounding: Pressure = Field(default=100.0, gt=0, description="rounding of the jet velocity at zero drop")
 
     a = takes_pressure("inlet")
     b = takes_pressure("outlet")
-    rod = takes_motion("the spool; the holes open towards increasing x")
+    rod = takes_motion("the spool")
     flow = gives_signal(Flow, "flow from a to b")
     q = observable(Flow, "flow from a to b")
     area = observable(Area, "open area of all holes")
-    jet_force = observable(Force, "flow force, positive towards decreasing x")
+    jet_force = observable(Force, "steady flow force, positive towards closing")
+    transient_force = observable(Force, "transient flow force, positive towards decreasing x")
+    loss = dissipates()
 
-    def equations(self, p_a: Expr, p_b: Expr, x_rod: Expr, fluid: Fluid) -> Equations:
-        segment, hydraulic_diameter = circle_segment(x_rod - self.overlap, self.diameter, self.edge_rounding)
-        area = self.number * segment
-        q = orifice_flow(p_a, p_b, area, hydraulic_diameter, self.cd_max, self.lambda_c, fluid)
-        drop, rho = p_a - p_b, fluid.density((p_a + p_b) / 2)
-        rounded = hypot(drop, self.drop_rounding)
-        jet_velocity = sqrt(2 * rounded / rho)
-        jet_force = self.jet_coefficient * rho * q * drop / rounded * jet_velocity * cos(self.jet_angle)
-        return {"q_a": q, "q_b": -q, "f_rod": jet_force, "flow": q, "q": q, "area": area, "jet_force": jet_force}
+    def equations(self, p_a: Expr, p_b: Expr, x_rod: Expr, v_rod: Expr, fluid: Fluid) -> Equations:
+        h = self.travel(x_rod)
+        segment, hydraulic_diameter = circle_segment(h, self.diameter, self.edge_rounding)
+        chord = circle_chord(h, self.diameter, self.edge_rounding)
+        uncovered = Uncovered(self.number * segment, self.number * chord, hydraulic_diameter)
+        passed = self.issued(uncovered, p_a, p_b, v_rod, fluid)
+        return {**passed, "flow": passed["q"]}
 
 
 class LeakageLand(Component):
@@ -175,6 +200,7 @@ class LeakageLand(Component):
     rod = takes_motion("the spool")
     q = observable(Flow, "flow from a to b")
     length = observable(Length, "length of the gap")
+    loss = dissipates()
 
     def equations(self, p_a: Expr, p_b: Expr, x_rod: Expr, v_rod: Expr, fluid: Fluid) -> Equations:
         growth = {"up": -1.0, "down": 1.0, "never": 0.0}[self.opens]

@@ -23,6 +23,7 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
+from crescentlab.prepared import LARGE, Prepared, prepare, shared
 from crescentlab.solvers.trajectory import GAUSS_NODES, GAUSS_WEIGHTS, Trajectory
 from crescentlab.symbols import column
 from crescentlab.system import System, Values
@@ -42,7 +43,7 @@ class EnergyBalance:
     supplied: float
     """From outside the circuit, less what left it there."""
     dissipated: dict[str, float]
-    """Turned into heat, per component that can do so."""
+    """Turned into heat, per component that did so."""
     stored: float
     """Change of what is stored."""
     at_events: dict[str, float]
@@ -56,9 +57,9 @@ class EnergyBalance:
             "circuit": self.circuit,
             "components": self.components,
             "supplied": self.supplied,
-            "dissipated": {k: v for k, v in self.dissipated.items() if v},
+            "dissipated": self.dissipated,
             "stored": self.stored,
-            "at_events": {k: v for k, v in self.at_events.items() if v},
+            "at_events": self.at_events,
             "silent": self.silent,
         }
 
@@ -94,8 +95,8 @@ def balance(system: System, values: Values, trajectory: Trajectory) -> Balance |
         system, values, trajectory, [inflow, flow, entering + supply - loss, passing, loss, supply]
     )
     energies_of = EnergyBalance(
-        *_errors(list(energies), left, power, energy_change), float(supplied.sum()), _by_name(energies, lost),
-        float(energy_change.total.sum()), _by_name(energies, energy_change.at_events), system.silent(),
+        *_errors(list(energies), left, power, energy_change), float(supplied.sum()), _nonzero(energies, lost),
+        float(energy_change.total.sum()), _nonzero(energies, energy_change.at_events), system.silent(),
     )  # fmt: skip
     return Balance(
         *_errors(list(contents), net, size, fluid_change), _by_name(contents, fluid_change.moved),
@@ -122,10 +123,11 @@ class _Change:
 
 def _changes(system: System, values: Values, trajectory: Trajectory, stored: list[ca.SX]) -> list[_Change]:
     t, x, h, b = trajectory.steps.arrays()
-    function = ca.Function("S", system.arguments, [ca.densify(each) for each in stored])
+    prepared = _prepared(system, stored)
+    q = prepared.parameters(values.p)
     at = trajectory.steps.jumps
     found: list[_Change] = []
-    for amounts in map(np.array, function(t.reshape(1, -1), x.T, h.T, b.T, values.p)):
+    for amounts in map(np.array, prepared.function(t.reshape(1, -1), x.T, h.T, b.T, q)):
         jumps = amounts[:, at] - amounts[:, at - 1]
         total, largest = amounts[:, -1] - amounts[:, 0], np.abs(amounts).max(axis=1)
         found.append(_Change(total, jumps.sum(axis=1), np.abs(jumps).sum(axis=1), largest))
@@ -134,17 +136,26 @@ def _changes(system: System, values: Values, trajectory: Trajectory, stored: lis
 
 def _integrals(system: System, values: Values, trajectory: Trajectory, rates: list[ca.SX]) -> list[Array]:
     """Integrals of ``rates`` over the run."""
-    function = ca.Function("Q", system.arguments, [ca.densify(column(rates))])
+    prepared = _prepared(system, rates)
+    q = prepared.parameters(values.p)
     pieces = trajectory.pieces
     low, high = np.array(pieces.low), np.array(pieces.high)
     h, b = np.array(pieces.h).T, np.array(pieces.b).T
     x = pieces.at_nodes()
-    found = np.zeros(function.numel_out(0))
+    found = [np.zeros(rate.numel()) for rate in rates]
     for node, weight in enumerate(GAUSS_WEIGHTS):
         # relations that compare time read it from frozen bits, so the node's own time serves signals
         t = low + (high - low) * GAUSS_NODES[node]
-        found += np.array(function(t.reshape(1, -1), x[:, node, :].T, h, b, values.p)) @ (weight * (high - low))
-    return np.split(found, np.cumsum([each.numel() for each in rates])[:-1])
+        now = prepared.function(t.reshape(1, -1), x[:, node, :].T, h, b, q)
+        found = [sum_ + np.array(rate) @ (weight * (high - low)) for sum_, rate in zip(found, now, strict=True)]
+    return found
+
+
+def _prepared(system: System, columns: list[ca.SX]) -> Prepared:
+    """The columns as a function; pressures of a net are one symbol, so that what its ports carry is found once."""
+    whole = shared(ca.densify(column(columns)), LARGE)
+    parts = ca.vertsplit(whole, [0, *np.cumsum([each.numel() for each in columns]).tolist()])
+    return prepare("ledger", system.arguments[:-1], system.p, parts)
 
 
 def _errors(names: list[str], into: Array, passing: Array, change: _Change) -> tuple[dict[str, float], float]:
@@ -152,6 +163,10 @@ def _errors(names: list[str], into: Array, passing: Array, change: _Change) -> t
     unit = max(float(passing.max(initial=0)), AT_REST * float(change.largest.max(initial=0)), 1e-300)
     missing = into - (change.total - change.at_events)
     return _by_name(names, np.abs(missing) / unit), float(abs(missing.sum()) / unit)
+
+
+def _nonzero(names: Iterable[str], numbers: Array) -> dict[str, float]:
+    return {name: number for name, number in _by_name(names, numbers).items() if number}
 
 
 def _by_name(names: Iterable[str], numbers: Array) -> dict[str, float]:

@@ -11,6 +11,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from contextvars import ContextVar
 from dataclasses import dataclass
+from functools import cache
 from typing import Any, Protocol, TypeAlias
 
 import casadi as ca
@@ -86,7 +87,9 @@ def _elementwise(symbolic: Callable[[ca.SX], ca.SX], numeric: Callable[[Any], An
 
 sqrt = _elementwise(ca.sqrt, np.sqrt, "Square root; its slope at 0 is infinite, so regularise the argument.")
 exp = _elementwise(ca.exp, np.exp, "Exponential.")
+expm1 = _elementwise(ca.expm1, np.expm1, "exp(x) - 1, exact for small x too.")
 log = _elementwise(ca.log, np.log, "Natural logarithm.")
+log1p = _elementwise(ca.log1p, np.log1p, "log(1 + x), exact for small x too.")
 sin = _elementwise(ca.sin, np.sin, "Sine of an angle [rad].")
 cos = _elementwise(ca.cos, np.cos, "Cosine of an angle [rad].")
 tan = _elementwise(ca.tan, np.tan, "Tangent of an angle [rad].")
@@ -96,6 +99,7 @@ atan = _elementwise(ca.atan, np.arctan, "Arc tangent [rad].")
 tanh = _elementwise(ca.tanh, np.tanh, "Hyperbolic tangent.")
 sinh = _elementwise(ca.sinh, np.sinh, "Hyperbolic sine.")
 cosh = _elementwise(ca.cosh, np.cosh, "Hyperbolic cosine.")
+asinh = _elementwise(ca.asinh, np.arcsinh, "Inverse hyperbolic sine.")
 fabs = _elementwise(ca.fabs, np.abs, "Absolute value.")
 sign = _elementwise(ca.sign, np.sign, "-1, 0 or 1; jumps without an event.")
 
@@ -169,6 +173,26 @@ def total(vector: Any) -> Any:
             else (vector if vector.shape == () else Sym.of(0.0))
         )
     return float(np.sum(vector))
+
+
+_leggauss = cache(np.polynomial.legendre.leggauss)
+
+
+def gauss_legendre(function: Callable[[Any], Any], a: Any, b: Any, nodes: int = 24) -> Any:
+    """Integral of a smooth ``function`` from ``a`` to ``b``, exact for polynomials of degree 2 ``nodes`` - 1.
+
+    ``function`` works element by element: between two scalars it is called once, with a vector of all nodes. It makes
+    no events, for a node is no place where the circuit is; so a table in it has plain knots.
+    """
+    places, weights = _leggauss(nodes)
+    middle, half = (a + b) / 2, (b - a) / 2
+    token = TRACER.set(None)
+    try:
+        if np.shape(half) == ():
+            return half * total(weights * function(middle + half * places))
+        return half * sum(float(w) * function(middle + half * float(x)) for x, w in zip(places, weights, strict=True))
+    finally:
+        TRACER.reset(token)
 
 
 def ones(n: int) -> np.ndarray:

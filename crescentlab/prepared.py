@@ -35,16 +35,18 @@ class Prepared:
 
 SMALL = 20_000
 """Expressions of more instructions are not searched for common parts, which would take longer than all else."""
+LARGE = 200_000
+"""The same where an expression is evaluated at every step of a run: the search takes some microseconds each."""
 
 
-def is_small(expression: ca.SX) -> bool:
+def is_small(expression: ca.SX, most: int = SMALL) -> bool:
     """Whether an expression is small enough to be searched."""
-    return expression.nnz() <= SMALL and int(ca.n_nodes(expression)) <= SMALL
+    return expression.nnz() <= most and int(ca.n_nodes(expression)) <= most
 
 
-def shared(expression: ca.SX) -> ca.SX:
+def shared(expression: ca.SX, most: int = SMALL) -> ca.SX:
     """``expression`` with common subexpressions computed once, if it is small enough to search."""
-    return ca.cse(expression) if expression.numel() and is_small(expression) else expression
+    return ca.cse(expression) if expression.numel() and is_small(expression, most) else expression
 
 
 def prepare(name: str, arguments: list[ca.SX], p: ca.SX, outputs: list[ca.SX], *, seldom: bool = False) -> Prepared:

@@ -23,7 +23,8 @@ from crescentlab.domain import Held, State
 from crescentlab.elaborate import Design
 from crescentlab.energy import keeps_books, power_ports
 from crescentlab.errors import InputError, nearest
-from crescentlab.prepared import Prepared, jacobian, prepare
+from crescentlab.prepared import LARGE, Prepared, jacobian, prepare, shared
+from crescentlab.symbols import column
 from crescentlab.trace import numeric_fields, structure_of
 from crescentlab.units import Quantity
 
@@ -208,10 +209,8 @@ class System:
         """A function giving the named variables' elements one after another."""
         key = tuple(names)
         if key not in self._functions:
-            column = [e for name in names for e in self.find(name).expression()]
-            self._functions[key] = ca.Function(
-                "v", self.arguments, [ca.densify(ca.vertcat(*column)) if column else ca.SX(0, 1)]
-            )
+            elements = [e for name in names for e in self.find(name).expression()]
+            self._functions[key] = ca.Function("v", self.arguments, [shared(ca.densify(column(elements)), LARGE)])
         return self._functions[key]
 
     def contents(self) -> dict[str, tuple[ca.SX, ca.SX, ca.SX]]:

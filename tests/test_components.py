@@ -46,6 +46,11 @@ SETTINGS: dict[str, dict[str, object]] = {
         for b in ("takes", "gives")
     },
     **{
+        f"pipe_{a}_{b}": {"diameter": 12e-3, "length": 0.72}
+        for a in ("inertial", "capacitive")
+        for b in ("inertial", "capacitive")
+    },
+    **{
         f"{line}_line_{a}_{b}": {
             "diameter": 12e-3,
             "length": 0.72,
@@ -86,9 +91,21 @@ def fluid(name: str) -> Fluid:
 
 WITHIN: dict[str, dict[str, tuple[float, float]]] = {
     "mass_with_stops": {"at": (0.0, 0.0)},
+    **{
+        name: {p: (3e5, 3.5e5) for p in ("p", "p_node", "p_a", "p_b") if p in form.asks_for()}
+        for name, form in FORMS.items()
+        if name.startswith(("pipe_inertial", "pipe_capacitive", "distributed_line"))
+    },
     "stick_slip_mass": {"direction": (1.0, 1.0), "v": (0.0, 1e-2)},
+    "piston_separator": {"pressure_a": (2e5, 2e5), "pressure_b": (2e5, 2e5)},
+    "trapped_volume": {"exists": (1.0, 1.0)},
 }
-"""Where the ledger of energy holds: a mass that rests does not move, and slides the way it goes."""
+"""Where the ledger of energy holds.
+
+A mass that rests does not move, and slides the way it goes; a piston between two fluids that is free has one pressure
+on both sides; a volume that does not exist does not grow; along a line the pressure changes little, so that what the
+fluid gains by expanding within its end cells, of either sign, stays below the friction.
+"""
 
 
 def looked_at(name: str, liquid: str, within: dict[str, tuple[float, float]] | None = None) -> Case:

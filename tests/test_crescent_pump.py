@@ -515,7 +515,7 @@ def test_figure_12_discharge_coefficient(lift, gauge):
     rho = oil.density(p / 2)
     speed = math.sqrt(2 * p / rho)
     flow_number = d_h / NU * speed  # Eq. 28
-    found = holes.equations(p_a=p, p_b=0.0, x_rod=lift, fluid=oil)["q"] / (area * speed)  # Eq. 27
+    found = holes.equations(p_a=p, p_b=0.0, x_rod=lift, v_rod=0.0, fluid=oil)["q"] / (area * speed)  # Eq. 27
     assert found == pytest.approx(0.74 * math.tanh(2 * flow_number / 50), rel=1e-3)
 
 

@@ -163,7 +163,7 @@ def test_helmholtz_resonator() -> None:
 
 
 def test_natural_frequency_of_a_cylinder() -> None:
-    """omega_h = sqrt(beta/m (A_1^2/V_1 + A_2^2/V_2)): Merritt, Hydraulic Control Systems (1967), section 6."""
+    """omega_h = sqrt(beta/m (A_1^2/V_1 + A_2^2/V_2)): Merritt, Hydraulic Control Systems (1967), chapter 6."""
     parts = circuit(
         components={
             "load": {"type": "mass_with_stops", "mass": "50 kg", "low": "-100 mm", "high": "100 mm",

@@ -13,7 +13,7 @@ from building import circuit
 from crescentlab.components.fluids import SimpleOil
 from crescentlab.components.poppets import BallPoppet, ConicalPoppet, FlapperNozzle
 from crescentlab.components.spools import AnnularPort, RectangularSlots, TriangularNotches
-from crescentlab.components.valve_laws import edge_share, opening
+from crescentlab.components.valve_laws import edge_share, middle_share, opening
 from crescentlab.components.valve_parts import RoundHoles
 from pydantic import ValidationError
 from scipy.integrate import quad
@@ -26,6 +26,7 @@ EDGES = [
     AnnularPort(diameter=10 * MM),
     RectangularSlots(number=4, width=3 * MM, length=2 * MM),
     TriangularNotches(number=4, length=2 * MM),
+    RoundHoles(number=4, diameter=2 * MM),
 ]
 POPPETS = [ConicalPoppet(seat_diameter=6 * MM), BallPoppet(seat_diameter=6 * MM, ball_diameter=8 * MM)]
 
@@ -62,6 +63,23 @@ def test_share_of_an_edge(overlap: float) -> None:
     x = (1 + overlap) / 2
     assert edge_share(x, overlap, w) == pytest.approx(0.5, rel=1e-12)
     assert np.all(np.diff(edge_share(np.linspace(-1.0, 1.0, 401), overlap, w)) >= 0)
+
+
+@pytest.mark.parametrize("closed", [0.1, 0.5, 1.0])
+def test_share_of_an_edge_that_is_open_in_the_middle(closed: float) -> None:
+    """1 in the middle, w/4 of the stroke open at `closed` and shut beyond, linear between, even, smooth at 0."""
+    w = 0.02
+    assert middle_share(0.0, closed, w) == pytest.approx(1.0, rel=1e-12)
+    assert middle_share(closed, closed, w) == pytest.approx(w / 4 / (closed - w / 2), rel=1e-12)
+    if closed < 1:
+        assert middle_share(closed + w, closed, w) == pytest.approx(0.0, abs=1e-15)
+    assert middle_share(closed / 2, closed, w) == pytest.approx(closed / 2 / (closed - w / 2), rel=1e-12)
+    x = np.linspace(0.0, 1.0, 401)
+    there, back = middle_share(x, closed, w), middle_share(-x, closed, w)
+    assert np.all(there == back)
+    assert np.all(np.diff(there) <= 0)
+    steps = np.diff(middle_share(np.linspace(-w, w, 401), closed, w))
+    assert np.abs(np.diff(steps)).max() == pytest.approx((2 * w / 400) ** 2 / (w * (closed - w / 2)), rel=1e-6)
 
 
 @pytest.mark.parametrize("part", EDGES, ids=name)
@@ -105,15 +123,17 @@ def test_round_holes_and_slots_agree_where_they_must() -> None:
     """A slot as wide as a hole's chord passes in its middle, per travel, what the hole does: dA/dx = 2 r."""
     holes, slot = RoundHoles(diameter=4 * MM), RectangularSlots(width=4 * MM, length=4 * MM)
     steps = [at_x * MM for at_x in (1.999, 2.001)]
-    of_holes = [holes.equations(p_a=0.0, p_b=0.0, x_rod=x, fluid=OIL)["area"] for x in steps]
+    of_holes = [at(holes, x)["area"] for x in steps]
     assert of_holes[1] - of_holes[0] == pytest.approx(at(slot, steps[1])["area"] - at(slot, steps[0])["area"], rel=1e-6)
 
 
-def test_slot_ends() -> None:
-    """Beyond its length a slot opens no further, and its transient force is gone."""
+def test_slot_and_hole_end() -> None:
+    """Beyond its length a slot opens no further, nor does a hole, and their transient force is gone."""
     slot = RectangularSlots(width=3 * MM, length=2 * MM, damping_length=20 * MM)
-    assert at(slot, 5 * MM)["area"] == pytest.approx(6e-6, rel=1e-12)
-    assert at(slot, 5 * MM, v=0.1)["transient_force"] == 0.0
+    hole = RoundHoles(diameter=2 * MM, damping_length=20 * MM)
+    for part, area in ((slot, 6e-6), (hole, math.pi * 1e-6)):
+        assert at(part, 5 * MM)["area"] == pytest.approx(area, rel=1e-12)
+        assert at(part, 5 * MM, v=0.1)["transient_force"] == 0.0
 
 
 # --- poppets ----------------------------------------------------------------------------------------------------------

@@ -32,7 +32,7 @@ def as_shipped(name: str) -> Result:
     return cl.load(name).simulate()
 
 
-@pytest.mark.parametrize("name", ["valve_cylinder", "flow_control", "counterbalanced_load"])
+@pytest.mark.parametrize("name", ["valve_cylinder", "flow_control", "bypass_flow_control", "counterbalanced_load"])
 def test_balance(name: str) -> None:
     """As shipped less than 1e-6 of what passes is lost."""
     ledger = as_shipped(name).balance
@@ -107,6 +107,88 @@ def test_flow_control_within_the_spring_range() -> None:
     q = run["metering.q"][held]
     assert q.min() > through(10.4e-6, 8 * BAR)
     assert q.max() < 1.006 * through(10.4e-6, 10 * BAR)
+
+
+PUMP = 40 * LPM
+"""Flow of each pump of bypass_flow_control."""
+
+
+def two_way(load: float) -> tuple[float, float]:
+    """Flow to the load and pressure of the pump, before a two-way flow control and beside a relief valve."""
+
+    def passed(p: float) -> float:
+        spare = p - load
+        within = brentq(
+            lambda d: 37.7 * (10 * BAR - d) / (2 * BAR) * math.sqrt(max(spare - d, 0.0)) - 10.4 * math.sqrt(d),
+            8 * BAR, 10 * BAR,
+        )  # fmt: skip
+        return through(10.4e-6, within)
+
+    p = brentq(lambda p: passed(p) + through(2e-5 * (p - 200 * BAR) / (10 * BAR), p) - PUMP, 200 * BAR, 210 * BAR)
+    return passed(p), p
+
+
+def three_way(load: float) -> tuple[float, float]:
+    """The same before an orifice with a bypass compensator."""
+
+    def missing(drop: float) -> float:
+        return through(10.4e-6, drop) + through(37.7e-6 * (drop - 8 * BAR) / (2 * BAR), load + drop) - PUMP
+
+    drop = brentq(missing, 8 * BAR, 10 * BAR)
+    return through(10.4e-6, drop), load + drop
+
+
+def three_way_of_parts(load: float) -> tuple[float, float]:
+    """The same before the valve built of parts: balance of forces on its spool."""
+    area, width = math.pi / 4 * 144e-6, math.pi * 12 * MM
+
+    def missing(drop: float) -> float:
+        surplus, v = PUMP - through(10.4e-6, drop), math.sqrt(2 * (load + drop) / 860)
+        spring = 8 * BAR * area + 22.6e3 * surplus / (0.7 * width * v)
+        return drop * area - spring - 860 * surplus * v * math.cos(math.radians(69))
+
+    drop = brentq(missing, 8 * BAR, 20 * BAR)
+    return through(10.4e-6, drop), load + drop
+
+
+@pytest.mark.parametrize(
+    ("load", "flows", "pressures"),
+    [
+        (50, (20.9, 19.1, 20.3), (201, 58.2, 59.3)), (100, (20.9, 19.0, 20.6), (201, 108, 110)),
+        (150, (20.8, 19.0, 20.9), (201, 158, 160)), (180, (20.5, 19.0, 21.0), (201, 188, 190)),
+    ],
+)  # fmt: skip
+def test_bypass_flow_control_by_hand(
+    load: int, flows: tuple[float, ...], pressures: tuple[float, ...]
+) -> None:  # fmt: skip
+    """bypass_flow_control: by hand without compressibility; 1 % of the flow and 0.2 bar for the density."""
+    run = as_shipped("bypass_flow_control")
+    controls = (
+        (two_way, "metering_two.q", "line_two.p"), (three_way, "metering_three.q", "line_three.p"),
+        (three_way_of_parts, "valve.q", "line_parts.p"),
+    )  # fmt: skip
+    for (by_hand, flow, pressure), printed_q, printed_p in zip(controls, flows, pressures, strict=True):
+        q, p = by_hand(load * BAR)
+        assert q / LPM == pytest.approx(printed_q, abs=0.051)
+        assert p / BAR == pytest.approx(printed_p, abs=0.051 if printed_p < 100 else 0.51)
+        assert at(run, flow, load / 100) == pytest.approx(q, rel=1e-2)
+        assert at(run, pressure, load / 100) == pytest.approx(p, abs=0.2 * BAR)
+
+
+def test_what_flow_controls_cost() -> None:
+    """bypass_flow_control at 50 bar: 13.4 kW before the two-way, 3.9 kW before the three-way flow control."""
+    run = as_shipped("bypass_flow_control")
+    assert at(run, "power_two", 0.5) == pytest.approx(13.4e3, abs=50)
+    assert at(run, "power_three", 0.5) == pytest.approx(3.9e3, abs=50)
+
+
+def test_three_way_flow_control_under_its_flow() -> None:
+    """A pump that gives less than is metered: either bypass stays shut; 1 % for what the rising load compresses."""
+    run = cl.load("bypass_flow_control").simulate("200 ms", {"pump_flow": "15 L/min"})
+    for name in ("metering_three.q", "valve.q"):
+        assert at(run, name, 0.2) == pytest.approx(15 * LPM, rel=1e-2)
+    assert at(run, "bypass.q", 0.2) == pytest.approx(0.0, abs=1e-12)
+    assert at(run, "valve.q_bypass", 0.2) == 0.0
 
 
 def test_counterbalanced_load() -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -13,12 +14,14 @@ from crescentlab.components.check_valves import IdealCheckValve, PilotOperatedCh
 from crescentlab.components.directional_valves import FourThreeValve, SpoolDrive, ThreeTwoValve, TwoTwoValve
 from crescentlab.components.fluids import SimpleOil
 from crescentlab.components.pressure_valves import (
+    BypassCompensator,
     CounterbalanceValve,
     PressureCompensator,
     ReducingRelievingValve,
     ReducingValve,
     ReliefValve,
     SecondOrderReliefValve,
+    SequenceValve,
 )
 from crescentlab.components.shuttle_valves import ShuttleValve
 from scipy.optimize import brentq
@@ -27,6 +30,7 @@ from crescentlab.result import Result
 
 BAR, MS = 1e5, 1e-3
 OIL = SimpleOil(density=860.0, kinematic_viscosity=35e-6, bulk_modulus=1.4e9)
+PARTS = Path(__file__).parent.parent / "circuits"
 STIFF = SimpleOil(density=860.0, kinematic_viscosity=35e-6, bulk_modulus=1e15)
 
 
@@ -44,19 +48,20 @@ def four(x: float, valve: FourThreeValve, **pressures: float) -> dict[str, Any]:
 
 
 @pytest.mark.parametrize("x", [-1.5, -1.0, -0.3, 0.0, 0.2, 1.0, 1.5])
-@pytest.mark.parametrize("overlap", [-0.1, 0.0, 0.1])
-def test_four_three_valve_keeps_nothing(x: float, overlap: float) -> None:
+@pytest.mark.parametrize(("overlap", "tandem"), [(-0.1, 0.0), (0.0, 0.0), (0.1, 0.0), (0.1, 20e-6)])
+def test_four_three_valve_keeps_nothing(x: float, overlap: float, tandem: float) -> None:
     """What enters leaves; turned round, the valve is its own mirror image with A and B exchanged."""
-    valve = FourThreeValve(area=10e-6, overlap=overlap)
+    valve = FourThreeValve(area=10e-6, overlap=overlap, tandem_area=tandem, tandem_stroke=0.4)
     got = four(x, valve)
     assert sum(got[f"q_{p}"] for p in ("supply", "a", "b", "tank")) == pytest.approx(0.0, abs=1e-18)
     mirror = four(-x, valve, p_a=40 * BAR, p_b=60 * BAR)
     assert got["q_supply_a"] == mirror["q_supply_b"]
     assert got["q_b_tank"] == mirror["q_a_tank"]
+    assert got["q_supply_tank"] == mirror["q_supply_tank"]
 
 
 def test_centres_of_a_four_three_valve() -> None:
-    """In the middle: closed by overlap; open by underlap; floating where only the tank edges underlap."""
+    """In the middle: closed by overlap; open by underlap; float where only the tank edges underlap; tandem."""
     closed = four(0.0, FourThreeValve(area=10e-6, overlap=0.1))
     assert all(closed[f"q_{p}"] == 0 for p in ("supply", "a", "b", "tank"))
     opened = four(0.0, FourThreeValve(area=10e-6, overlap=-0.1))
@@ -65,6 +70,36 @@ def test_centres_of_a_four_three_valve() -> None:
     floating = four(0.0, FourThreeValve(area=10e-6, overlap=0.1, tank_overlap=-0.1))
     assert floating["q_supply"] == 0
     assert floating["q_a_tank"] == opened["q_a_tank"]
+    tandem = four(0.0, FourThreeValve(area=10e-6, overlap=0.1, tandem_area=20e-6))
+    assert tandem["q_a"] == tandem["q_b"] == 0
+    assert tandem["q_supply"] == -tandem["q_tank"] == pytest.approx(through(20e-6, 98 * BAR), rel=5e-3)
+
+
+def test_tandem_centre_unloads_the_pump() -> None:
+    """A pump of 20 L/min and a relief valve at 100 bar: at rho/2 (q/(Cd A))^2 = 2.44 bar as long as the spool is in the
+    middle, at the relief valve's 105 bar once it feeds a shut port; 0.5 % for the flow number."""
+    parts = {
+        "pump": {"type": "flow_source", "flow": "20 L/min"}, "tank": {"type": "tank"},
+        "line": {"type": "capacity", "volume": "200 cm^3"},
+        "relief": {"type": "relief_valve", "area": "20 mm^2", "cracking_pressure": "100 bar",
+                   "opening_range": "20 bar"},
+        "asked": {"type": "step", "after": "1", "at": "200 ms"},
+        "valve": {"type": "./proportional_valve_part.yaml", "overlap": "10 %", "tandem_area": "20 mm^2"},
+        "left": {"type": "capacity", "volume": "200 cm^3"}, "right": {"type": "capacity", "volume": "200 cm^3"},
+    }  # fmt: skip
+    nets = {
+        "p": ["pump.port", "line.port", "relief.a", "valve.supply"], "t": ["relief.b", "tank.port", "valve.tank"],
+        "u": ["asked.y", "valve.command"], "a": ["valve.a", "left.port"], "b": ["valve.b", "right.port"],
+    }  # fmt: skip
+    made = circuit(components=parts, nets=nets, fluid=OIL_TEXT, folder=PARTS, simulation={"stop": "400 ms"})
+    run = made.simulate(rtol=1e-8)
+    idle = 430 * (20e-3 / 60 / (0.7 * 20e-6)) ** 2
+    assert idle == pytest.approx(2.44 * BAR, abs=0.005 * BAR)
+    assert np.interp(0.19, run.time, run["line.p"]) == pytest.approx(idle, rel=5e-3)
+    assert np.interp(0.19, run.time, run["left.p"]) == 0.0
+    full = brentq(lambda p: through(20e-6 * (p / BAR - 100) / 20, p) - 20e-3 / 60, 100 * BAR, 120 * BAR)
+    assert run["line.p"][-1] == pytest.approx(full, rel=5e-3)
+    assert run["left.p"][-1] == pytest.approx(full, rel=5e-3)
 
 
 def test_area_ratio_of_a_four_three_valve() -> None:
@@ -159,6 +194,55 @@ def test_static_characteristics() -> None:
             "der_lift"
         ]
         assert got == pytest.approx(share, abs=1e-12)
+
+
+def test_sequence_valve_does_not_see_its_outlet() -> None:
+    """Opened by pilot less drain alone: shut up to 100 bar, half open at 110 bar, whatever the outlet's pressure."""
+    valve = SequenceValve(area=10e-6, set_pressure=100 * BAR, opening_range=20 * BAR, time_constant=1.0)
+    for p_b in (0, 60, 300):
+        for pilot, drain, share in ((99, 0, 0.0), (100, 0, 0.0), (110, 0, 0.5), (113, 3, 0.5), (120, 0, 1.0)):
+            got = valve.equations(
+                p_a=150 * BAR, p_b=p_b * BAR, p_pilot=pilot * BAR, p_drain=drain * BAR, lift=0.0, fluid=OIL
+            )
+            assert got["der_lift"] == pytest.approx(share, abs=1e-12)
+            assert got["q"] == 0.0
+
+
+@pytest.mark.parametrize("external", [False, True])
+def test_second_user_waits_for_the_first(external: bool) -> None:
+    """10 L/min fill 1 L to 50 bar in V p/(beta q) = 21.4 ms (to 2 % for the density); then, and not before, the second
+    user is fed, whose own pressure does not hold the valve back. An external pilot line of 0 bar keeps it shut."""
+    parts = {
+        "pump": {"type": "flow_source", "flow": "10 L/min"}, "tank": {"type": "tank"},
+        "first": {"type": "capacity", "volume": "1 L"},
+        "valve": {"type": "sequence_valve", "area": "20 mm^2", "set_pressure": "50 bar", "opening_range": "5 bar",
+                  "time_constant": "1 ms"},
+        "second": {"type": "capacity", "volume": "1 L"},
+    }  # fmt: skip
+    pilot = {"p": ["pump.port", "first.port", "valve.a"], "t": ["tank.port", "valve.drain"]}
+    pilot["t" if external else "p"].append("valve.pilot")
+    nets = {**pilot, "s": ["valve.b", "second.port"]}
+    run = circuit(components=parts, nets=nets, fluid=OIL_TEXT, simulation={"stop": "60 ms"}).simulate(rtol=1e-8)
+    assert run.balance is not None
+    assert run.balance.circuit < 1e-6
+    fed = run["second.p"] > 0
+    if external:
+        assert not fed.any()
+        return
+    begins = 50e5 * 1e-3 / (1.4e9 * 10e-3 / 60)
+    assert begins == pytest.approx(21.4 * MS, abs=0.05 * MS)
+    assert run.time[fed][0] == pytest.approx(begins, rel=2e-2)
+    assert run["second.p"][-1] == pytest.approx(run["first.p"][-1], abs=0.5 * BAR)
+    assert run["second.p"][-1] > 50 * BAR
+
+
+def test_bypass_compensator_follows_the_load() -> None:
+    """Shut while the drop over the metering edge is below 8 bar, half open at 9, open at 10, at any load and tank."""
+    valve = BypassCompensator(area=10e-6, control_pressure=8 * BAR, opening_range=2 * BAR, time_constant=1.0)
+    for load in (0, 50, 300):
+        for drop, share in ((-5, 0.0), (8, 0.0), (9, 0.5), (10, 1.0), (50, 1.0)):
+            got = valve.equations(p_a=(load + drop) * BAR, p_b=4 * BAR, p_load=load * BAR, lift=0.0, fluid=OIL)
+            assert got["der_lift"] == pytest.approx(share, abs=1e-12)
 
 
 def test_reducing_relieving_valve_in_its_dead_band() -> None:

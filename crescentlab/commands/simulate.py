@@ -168,28 +168,30 @@ def _facts(result: Result) -> list[tuple[str, str]]:
 
 
 def _ledgers(balance: Balance) -> Iterator[tuple[str, str]]:
-    """How well the balances of fluid and energy close, and where the energy went."""
+    """How well the ledgers of fluid and energy close, and where the energy went."""
 
-    def closes(circuit: float, components: dict[str, float]) -> str:
+    def closes(what: str, circuit: float, components: dict[str, float]) -> str:
         worst = max(components, key=lambda name: components[name])
-        return f"{circuit:.1e}; at most {components[worst]:.1e}, {worst}"
+        return f"{what} {circuit:.1e}, at most {components[worst]:.1e} ({worst})"
 
+    energy, told = balance.energy, []
     if balance.components:
-        yield "balance", f"of fluid, of the flow {closes(balance.circuit, balance.components)}"
+        told.append(closes("of the flow", balance.circuit, balance.components))
+    if energy is not None:
+        told.append(closes("of the power", energy.circuit, energy.components))
+    yield "balance", "; ".join(told)
     if merged := sum(balance.merged.values()):
         yield "merged", f"{QUANTITIES['volume'].show(merged, 'cm3', 3)} moved by events"
-    if (energy := balance.energy) is None:
+    if energy is None:
         return
-    yield "", f"of energy, of the power {closes(energy.circuit, energy.components)}"
-    said = [(energy.supplied, "supplied"), (sum(energy.dissipated.values()), "to heat"), (energy.stored, "stored")]
-    told = [f"{_joules(amount)} {what}" for amount, what in said]
+    amounts = [(energy.supplied, "supplied"), (sum(energy.dissipated.values()), "to heat"), (energy.stored, "stored")]
+    said = [f"{_joules(amount)} {where}" for amount, where in amounts]
     if lost := sum(energy.at_events.values()):
-        told.append(f"of which {_joules(lost)} at events")
-    yield "energy", ", ".join(told)
+        said.append(f"of it {_joules(lost)} at events")
     if energy.silent:
         more = len(energy.silent) - MAX_SILENT
-        names = ", ".join(energy.silent[:MAX_SILENT]) + (f" and {more} more" if more > 0 else "")
-        yield "", f"without {names}, which keep no books of energy"
+        said.append(f"without {', '.join(energy.silent[:MAX_SILENT])}" + (f" and {more} more" if more > 0 else ""))
+    yield "energy", ", ".join(said)
 
 
 def _joules(amount: float) -> str:

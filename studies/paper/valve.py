@@ -99,7 +99,7 @@ def _discharge_curve() -> tuple[np.ndarray, np.ndarray]:
     numbers, found = [], []
     for p in np.geomspace(1.0, 10 * BAR, 400):
         speed = math.sqrt(2 * p / oil.density(p / 2))
-        q = holes.equations(p_a=p, p_b=0.0, x_rod=0.35 * MM, fluid=oil)["q"]
+        q = holes.equations(p_a=p, p_b=0.0, x_rod=0.35 * MM, v_rod=0.0, fluid=oil)["q"]
         numbers.append(float(d_h * speed / _nu()))
         found.append(float(q / (4 * area * speed)))
     return np.array(numbers), np.array(found)

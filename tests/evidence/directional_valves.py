@@ -7,10 +7,11 @@ import math
 from building import circuit
 from crescentlab.components.directional_valves import FourThreeValve, ThreeTwoValve, TwoTwoValve
 from crescentlab.components.fluids import SimpleOil
+from scipy.optimize import brentq
 
 from evidence import Number, evidence
 
-BAR = 1e5
+BAR, LPM = 1e5, 1e-3 / 60
 RHO = 860.0
 OIL = SimpleOil(density=RHO, kinematic_viscosity=30e-6, bulk_modulus=1e15)
 ROUND = 1e-6
@@ -61,6 +62,66 @@ def overlap() -> list[Number]:
         for name, q in (("two_two_valve", two), ("three_two_valve", three), ("four_three_valve", four)):
             found.append(Number(f"{name} at {x:g}", share, q / full, size=1.0))
     return found
+
+
+CENTRES = {
+    "closed": {"overlap": 0.05},
+    "open": {"overlap": -0.1},
+    "float": {"overlap": 0.05, "tank_overlap": -0.1},
+    "tandem": {"overlap": 0.05, "tandem_area": 10e-6},
+}
+"""Settings of the four usual centres."""
+
+
+@evidence(
+    "four_three_valve",
+    source="shares in the middle: u/(1 + u) of the area for an underlap u, all of the tandem area from P to T",
+    tolerance=1e-6,
+    because="tanh(2 lambda/lambda_c) is 1 to 1e-7 here",
+)
+def centres() -> list[Number]:
+    """Flows of 10 mm^2 in the middle, 200, 120, 80 and 0 bar at P, A, B, T: centres closed, open, float, tandem."""
+    drops = {"supply_a": 80, "supply_b": 120, "a_tank": 120, "b_tank": 80, "supply_tank": 200}
+    underlapped = 0.1 / 1.1
+    shares = {
+        "closed": {}, "open": dict.fromkeys(("supply_a", "supply_b", "a_tank", "b_tank"), underlapped),
+        "float": dict.fromkeys(("a_tank", "b_tank"), underlapped), "tandem": {"supply_tank": 1.0},
+    }  # fmt: skip
+    found = []
+    for centre, settings in CENTRES.items():
+        valve = FourThreeValve(area=10e-6, lambda_c=1.0, **settings)
+        got = valve.equations(
+            p_supply=200 * BAR, p_a=120 * BAR, p_b=80 * BAR, p_tank=0.0, stroke=0.0, fluid=OIL
+        )  # fmt: skip
+        for edge, drop in drops.items():
+            full = 0.7 * 10e-6 * math.sqrt(2 * drop * BAR / RHO)
+            expected = shares[centre].get(edge, 0.0) * full
+            name = f"{centre}: {edge.replace('_', ' to ')}"
+            found.append(Number(name, expected, got[f"q_{edge}"], "L/min", size=full))
+    return found
+
+
+@evidence(
+    "four_three_valve",
+    source="linear edge that closes at c = 20 %: (c - |x|)/c, in the middle 1; pressure drop rho/2 (q/(Cd A s))^2",
+    tolerance=1e-6,
+    because="tanh(2 lambda/lambda_c) is 1 to 1e-7 here; the corner in the middle is rounded to 1e-9 of the stroke",
+)
+def unloaded() -> list[Number]:
+    """Drop from P to T of a pump of 40 L/min, tandem centre of 20 mm^2, at strokes of 0, 5, -10, 15 %, and at 25 %."""
+    settings = {"area": 10e-6, "overlap": 0.2, "tandem_area": 20e-6, "tandem_stroke": 0.2}
+    valve = FourThreeValve(**settings, lambda_c=1.0, edge_rounding=1e-9)
+    still = {"p_a": 0.0, "p_b": 0.0, "p_tank": 0.0, "fluid": OIL}
+    found = []
+    for x, share in ((0.0, 1.0), (0.05, 0.75), (-0.1, 0.5), (0.15, 0.25)):
+        expected = RHO / 2 * (40 * LPM / (0.7 * 20e-6 * share)) ** 2
+        p = brentq(
+            lambda p, x=x: valve.equations(p_supply=p, stroke=x, **still)["q_supply_tank"] - 40 * LPM,
+            0.0, 300 * BAR, xtol=1e-3,
+        )  # fmt: skip
+        found.append(Number(f"stroke {x:g}", expected, p, "bar"))
+    shut = valve.equations(p_supply=200 * BAR, stroke=0.25, **still)["q_supply_tank"]
+    return [*found, Number("stroke 0.25: flow", 0.0, shut, "L/min")]
 
 
 @evidence(

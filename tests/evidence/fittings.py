@@ -104,7 +104,7 @@ def turning() -> list[Number]:
 
 @evidence(
     "elbow",
-    source="J. Weisbach's table of elbows",
+    source="J. Weisbach's table of elbows; his formula, rounded to 0.95 and 2.05, in Idelchik, chapter 6",
     tolerance=4e-3,
     because="the table has three decimals, 0.139 +- 0.0005 at 40 degrees",
 )

@@ -50,25 +50,31 @@ def full_flow() -> list[Number]:
 
 @evidence(
     "laminar_turbulent_orifice",
-    source="Wuest (1954), in Merritt (1967), section 3-3: Q = pi d^3 dp/(50.4 mu) and pi b^2 w dp/(32 mu)",
+    source="creeping flow through a thin plate: hole d^3 dp/(24 mu) (Sampson, 1891), slit pi b^2 w dp/(32 mu) "
+    "(Hasimoto, J. Phys. Soc. Japan 13 (1958) 633-639); hole of Wuest (1954), in Merritt (1967): pi d^3 dp/(50.4 mu)",
     tolerance=1e-2,
-    because="Merritt rounds the coefficients 0.1992 and 0.1567 to 0.2 and 0.157, and they enter squared",
+    because="the coefficients 0.1629, 0.1567 and 0.1992 are rounded to three or two digits, and they enter squared",
 )
 def creeping_flow() -> list[Number]:
     """Laminar limit, 1 Pa: a round hole of 1 mm and a slit of 0.1 mm by 10 mm."""
-    mu = 850.0 * 30e-6
-    hole = LaminarTurbulentOrifice(area=math.pi / 4 * 1e-6)
-    slit = LaminarTurbulentOrifice(area=1e-6, hydraulic_diameter=0.2e-3, laminar_coefficient=0.157)
-    q_hole, q_slit = (part.equations(p_a=1.0, p_b=0.0, fluid=OIL)["q"] for part in (hole, slit))
+    area, mu = math.pi / 4 * 1e-6, 850.0 * 30e-6
+    parts = {
+        "hole, 0.163": (LaminarTurbulentOrifice(area=area, laminar_coefficient=0.163), 1e-9 / (24 * mu)),
+        "hole, Wuest's 0.2": (LaminarTurbulentOrifice(area=area), math.pi * 1e-9 / (50.4 * mu)),
+        "slit, 0.157": (
+            LaminarTurbulentOrifice(area=1e-6, hydraulic_diameter=0.2e-3, laminar_coefficient=0.157),
+            math.pi * 1e-8 * 1e-2 / (32 * mu),
+        ),
+    }
     return [
-        Number("round hole", math.pi * 1e-9 / (50.4 * mu), q_hole, "mm3/s"),
-        Number("slit", math.pi * 1e-8 * 1e-2 / (32 * mu), q_slit, "mm3/s"),
+        Number(what, expected, part.equations(p_a=1.0, p_b=0.0, fluid=OIL)["q"], "mm3/s")
+        for what, (part, expected) in parts.items()
     ]
 
 
 @evidence(
     "laminar_turbulent_orifice",
-    source="Merritt (1967), section 3-3: Re_t = (0.611/0.2)^2 = 9.3; C_d = pi/(pi + 2) of von Mises for high Re",
+    source="Merritt (1967), chapter 3: Re_t = (0.611/0.2)^2 = 9.3; C_d = pi/(pi + 2) of von Mises for high Re",
     tolerance=3e-3,
     because="9.3 has two digits, 9.333 in full",
 )

@@ -7,7 +7,12 @@ from typing import Any
 
 from building import OIL, circuit
 from crescentlab.components.fluids import SimpleOil
-from crescentlab.components.pressure_valves import CounterbalanceValve, ReliefValve, SecondOrderReliefValve
+from crescentlab.components.pressure_valves import (
+    CounterbalanceValve,
+    ReliefValve,
+    SecondOrderReliefValve,
+    SequenceValve,
+)
 from scipy.optimize import brentq
 
 from crescentlab.result import Result
@@ -144,6 +149,63 @@ def relieving() -> list[Number]:
 
 
 @evidence(
+    "sequence_valve",
+    source="balance at rest with the spring drained: q = Cd A (p_a - p_d - p_c)/p_r sqrt(2 (p_a - p_b)/rho), for p_a",
+    tolerance=1e-5,
+    because="tanh(2 lambda/lambda_c) is 1 to 1e-6 here; tolerance of the run",
+)
+def in_sequence() -> list[Number]:
+    """Inlet pressure at 20 L/min, 20 mm^2, set to 100 bar (range 20 bar), outlet at 0 to 90 bar, drain at 0, 5 bar."""
+    found = []
+    for outlet, drained in ((0, 0), (60, 0), (90, 0), (60, 5)):
+        run = rest(
+            {
+                "pump": {"type": "flow_source", "flow": "20 L/min"}, "line": {**SOFT, "start": {"p": "105 bar"}},
+                "valve": {"type": "sequence_valve", "area": "20 mm^2", "set_pressure": "100 bar",
+                          "opening_range": "20 bar"},
+                "next": {"type": "pressure_source", "pressure": f"{outlet} bar"},
+                "drain": {"type": "pressure_source", "pressure": f"{drained} bar"},
+            },
+            {
+                "p": ["pump.port", "line.port", "valve.a", "valve.pilot"], "n": ["valve.b", "next.port"],
+                "d": ["drain.port", "valve.drain"],
+            },
+            "1 s",
+        )  # fmt: skip
+        opens = (100 + drained) * BAR
+        expected = brentq(
+            lambda p, o=opens, b=outlet * BAR: through(20e-6 * (p - o) / (20 * BAR), p - b) - 20 * LPM,
+            opens, opens + 20 * BAR, xtol=1e-3,
+        )  # fmt: skip
+        name = f"outlet {outlet} bar, drain {drained} bar"
+        found.append(Number(name, expected, float(run["line.p"][-1]), "bar"))
+    return found
+
+
+@evidence(
+    "sequence_valve",
+    source="balance of forces: it begins to open at p_x = p_c + p_d, whatever inlet and outlet",
+    tolerance=1e-6,
+    because="root of the equations, located to 1e-9",
+)
+def piloted() -> list[Number]:
+    """Pilot pressure at which a valve set to 70 bar begins to open, drained at 0 and 3 bar, any inlet and outlet."""
+    valve = SequenceValve(area=20e-6, set_pressure=70 * BAR, opening_range=20 * BAR)
+    found = []
+    for inlet, outlet, drained in ((0, 0, 0), (200, 0, 0), (200, 150, 0), (200, 150, 3)):
+
+        def rate(pilot: float, at: tuple[int, ...] = (inlet, outlet, drained)) -> float:
+            p_a, p_b, p_drain = (p * BAR for p in at)
+            got = valve.equations(p_a=p_a, p_b=p_b, p_pilot=pilot, p_drain=p_drain, lift=0.5, fluid=STIFF)
+            return float(got["der_lift"] * valve.time_constant + 0.5 - 1e-6)
+
+        opens = brentq(rate, 0.0, 90 * BAR, rtol=1e-9)
+        name = f"inlet {inlet} bar, outlet {outlet} bar, drain {drained} bar"
+        found.append(Number(name, (70 + drained + 1e-6 * 20) * BAR, opens, "bar"))
+    return found
+
+
+@evidence(
     "counterbalance_valve",
     source="balance of forces: p_a + R p_x = p_c + (1 + R) p_b, without the last term where it is vented",
     tolerance=1e-6,
@@ -198,4 +260,41 @@ def compensated() -> list[Number]:
                 lambda d, p=load: 37.7 * (10 - d) / 2 * math.sqrt(200 - p - d) - 10.4 * math.sqrt(d), 8, 10, xtol=1e-9
             )
         found.append(Number(f"load {load} bar", through(10.4e-6, drop * BAR), float(run["edge.q"][-1]), "L/min"))
+    return found
+
+
+@evidence(
+    "bypass_compensator",
+    source="flows add up to the pump's, the bypass open by (d - p_c)/p_r: A_2 sqrt(d) + A_1 s sqrt(p_l + d) = "
+    "q/(Cd sqrt(2/rho)), solved for the drop d over the metering edge",
+    tolerance=1e-5,
+    because="tanh(2 lambda/lambda_c) is 1 to 1e-6 here; tolerance of the run",
+)
+def bypassed() -> list[Number]:
+    """A pump of 40 L/min, 10.4 mm^2 to loads of 0, 100, 200 bar, a bypass of 37.7 mm^2 set to 8 and 2 bar."""
+    found = []
+    for load in (0, 100, 200):
+        run = rest(
+            {
+                "pump": {"type": "flow_source", "flow": "40 L/min"}, "tank": {"type": "tank"},
+                "load": {"type": "pressure_source", "pressure": f"{load} bar"},
+                "line": {**SOFT, "start": {"p": f"{load + 8} bar"}},
+                "valve": {"type": "bypass_compensator", "area": "37.7 mm^2", "control_pressure": "8 bar",
+                          "opening_range": "2 bar"},
+                "edge": {"type": "orifice", "area": "10.4 mm^2"},
+            },
+            {
+                "p": ["pump.port", "line.port", "valve.a", "edge.a"], "l": ["edge.b", "load.port", "valve.load"],
+                "t": ["valve.b", "tank.port"],
+            },
+            "1 s",
+        )  # fmt: skip
+        drop = brentq(
+            lambda d, p=load * BAR: through(10.4e-6, d)
+            + through(37.7e-6 * (d - 8 * BAR) / (2 * BAR), p + d)
+            - 40 * LPM,
+            8 * BAR, 10 * BAR, xtol=1e-3,
+        )  # fmt: skip
+        found.append(Number(f"load {load} bar: flow to it", through(10.4e-6, drop), float(run["edge.q"][-1]), "L/min"))
+        found.append(Number(f"load {load} bar: pump", load * BAR + drop, float(run["line.p"][-1]), "bar"))
     return found

@@ -83,7 +83,8 @@ def turbulent() -> list[Number]:
 
 @evidence(
     "short_tube",
-    source="Merritt (1967), section 3-3: Cd = (1.5 + 13.74 x^0.5)^-0.5 and (2.28 + 64 x)^-0.5, x = l/(d Re)",
+    source="Merritt (1967), chapter 3, in Rabie (2009), Eqs. 2.40 and 2.41: Cd = (1.5 + 13.74 x^0.5)^-0.5 and "
+    "(2.28 + 64 x)^-0.5, x = l/(d Re)",
     tolerance=0.02,
     because="the two formulas, 1.7 % apart at x = 0.02 and more beyond, are joined smoothly by Shah's weight",
 )

@@ -52,7 +52,7 @@ def uncovered() -> list[Number]:
     holes = RoundHoles(diameter=2 * MM)
     found = []
     for height, area in ((0.2, 0.16350), (0.5, 0.61418), (1.0, 1.57080), (1.5, 2.52741)):
-        got = holes.equations(p_a=0.0, p_b=0.0, x_rod=height * MM, fluid=OIL)["area"]
+        got = holes.equations(p_a=0.0, p_b=0.0, x_rod=height * MM, v_rod=0.0, fluid=OIL)["area"]
         found.append(Number(f"area at {height:g} mm", area * 1e-6, got, "mm2"))
     return found
 
@@ -66,13 +66,33 @@ def uncovered() -> list[Number]:
 def flow_force() -> list[Number]:
     """Flow and flow force of four holes of 5.5 mm, half open at 8 bar."""
     holes = RoundHoles(number=4, diameter=5.5 * MM, jet_coefficient=0.82, cd_max=0.74, lambda_c=50.0)
-    got = holes.equations(p_a=8 * BAR, p_b=0.0, x_rod=2.75 * MM, fluid=OIL)
+    got = holes.equations(p_a=8 * BAR, p_b=0.0, x_rod=2.75 * MM, v_rod=0.0, fluid=OIL)
     v = math.sqrt(2 * 8 * BAR / 860.0)
     q = 4 * 0.74 * math.pi / 8 * (5.5 * MM) ** 2 * v
     return [
         Number("flow", q, got["q"], "L/min"),
         Number("force", 0.82 * 860.0 * q * v * math.cos(math.radians(69)), got["jet_force"], "N"),
     ]
+
+
+@evidence(
+    "round_holes",
+    source="Merritt (1967), chapter 5: F = L Cd w sqrt(2 rho dp) dx/dt, the area gradient w = n 2 sqrt(h (d - h))",
+    tolerance=1e-6,
+    because="tanh(2 lambda/lambda_c) is 1 to 1e-7 here",
+)
+def transient_flow_force() -> list[Number]:
+    """Transient flow force of four holes of 5.5 mm at 70 bar and 0.5 m/s, damping length 20 mm, both ways."""
+    found = []
+    for height in (1.0, 2.75, 4.5):
+        gradient = 4 * 2 * math.sqrt(height * (5.5 - height)) * MM
+        expected = 20 * MM * 0.74 * gradient * math.sqrt(2 * 860.0 * 70 * BAR) * 0.5
+        for length, sign in ((20 * MM, 1), (-20 * MM, -1)):
+            holes = RoundHoles(number=4, diameter=5.5 * MM, cd_max=0.74, lambda_c=50.0, damping_length=length)
+            got = holes.equations(p_a=70 * BAR, p_b=0.0, x_rod=height * MM, v_rod=0.5, fluid=OIL)
+            name = f"{height:g} mm uncovered, {'out of' if sign > 0 else 'into'} the chamber"
+            found.append(Number(name, sign * expected, got["transient_force"], "N"))
+    return found
 
 
 @evidence(
