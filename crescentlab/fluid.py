@@ -6,6 +6,7 @@ from typing import Any
 
 from pydantic import BaseModel, ConfigDict, Field
 
+from crescentlab.errors import ComponentError
 from crescentlab.maths import Expr, asinh, cosh, gauss_legendre, sinh
 from crescentlab.units import Pressure
 
@@ -22,6 +23,15 @@ class Fluid(BaseModel):
     """
 
     model_config = ConfigDict(extra="forbid", frozen=True, validate_default=True)
+
+    @classmethod
+    def __pydantic_init_subclass__(cls, **kwargs: Any) -> None:
+        inherited = next(base for base in cls.__mro__ if "enthalpy" in vars(base))
+        if "density" in vars(cls) and inherited not in (cls, Fluid):
+            raise ComponentError(
+                f"fluid {cls.__name__}: has a density of its own and the enthalpy of {inherited.__name__}, so that "
+                "energy would not be kept; write enthalpy too, or `enthalpy = Fluid.enthalpy` for a smooth density"
+            )
 
     tension: bool = Field(
         default=False, description="true: pressures below absolute zero warn instead of ending the run"

@@ -9,11 +9,21 @@ from crescentlab.components.pipes import Pipe
 from pydantic import Field
 
 from crescentlab.component import Component, Equations
-from crescentlab.contract import check_component
-from crescentlab.domain import gives_pressure, observable, state, stores, takes_pressure
+from crescentlab.contract import check_component, check_fluid
+from crescentlab.domain import (
+    dissipates,
+    gives_pressure,
+    observable,
+    state,
+    stores,
+    stores_energy,
+    takes_motion,
+    takes_pressure,
+)
+from crescentlab.errors import ComponentError
 from crescentlab.fluid import Fluid
 from crescentlab.maths import Expr, fabs, hypot, sqrt
-from crescentlab.units import Area, Flow, Pressure, Volume
+from crescentlab.units import Area, Flow, Pressure, Stiffness, Volume
 
 OIL = SimpleOil(density=860.0, kinematic_viscosity=35e-6, bulk_modulus=1.4e9)
 
@@ -124,6 +134,43 @@ class Forgets(Volumes):
         return {"p_port": p, "der_p": fluid.bulk_modulus(p) / self.volume * q_port, "content": self.volume}
 
 
+class MovesMore(Hole):
+    __doc__ = Hole.__doc__
+    stored_energy = stores_energy()
+    loss = dissipates()
+
+    def equations(self, p_a: Expr, p_b: Expr, fluid: Fluid) -> Equations:
+        q = self.area * (p_a - p_b)
+        return {"q_a": q, "q_b": -q, "q": q, "stored_energy": 0.0, "loss": 0.5 * q * (p_a - p_b)}
+
+
+class Pushes(Hole):
+    __doc__ = Hole.__doc__
+    loss = dissipates()
+
+    def equations(self, p_a: Expr, p_b: Expr, fluid: Fluid) -> Equations:
+        q = -self.area * (p_a - p_b)
+        return {"q_a": q, "q_b": -q, "q": q}
+
+
+class Limp(Component):
+    r"""Spring that pushes one end more than the other.
+
+    .. math:: f = k x
+
+    f [N]; k = `stiffness` [N/m]; x [m]. Not for use. Source: Hooke's law.
+    """
+
+    stiffness: Stiffness = Field(gt=0, description="force per length")
+
+    a = takes_motion("one end")
+    b = takes_motion("other end")
+
+    def equations(self, x_a: Expr, x_b: Expr) -> Equations:
+        force = self.stiffness * (x_a - x_b)
+        return {"f_a": force, "f_b": -0.9 * force}
+
+
 @pytest.mark.parametrize(
     ("wrong", "told"),
     [
@@ -135,6 +182,9 @@ class Forgets(Volumes):
         (Keeps, r"Keeps: q_a is .* m\^3/s, q_b .*; their sum must be 0"),
         (Lopsided, "Lopsided: .*with the pressures exchanged .*; it must be the opposite"),
         (Forgets, r"Forgets: content grows by 0 m\^3/s, but .* m\^3/s flow in"),
+        (MovesMore, "MovesMore: .* W enter and 0 W are supplied, but 0 W are stored and .* W lost"),
+        (Pushes, "Pushes: -.* W enter and 0 W are supplied, and -.* W lost: heat does no work"),
+        (Limp, r"Limp: f_a is .*, f_b .*; their sum must be 0"),
     ],
     ids=lambda given: given.__name__ if isinstance(given, type) else "",
 )
@@ -171,6 +221,42 @@ def test_values_the_equations_do_not_admit_are_left_out() -> None:
     check_component(RootVolume, within={"p": (1e4, 1e6)})
     with pytest.raises(TypeError, match="RootVolume: within names x; its equations know p, q_port"):
         check_component(RootVolume, within={"x": (0.0, 1.0)})
+
+
+class Steam(Fluid):
+    """Fluid of a constant density that claims to be compressible."""
+
+    def density(self, p: Expr) -> Expr:
+        return 860.0 + 0.0 * p
+
+    def bulk_modulus(self, p: Expr) -> Expr:
+        return 1.4e9 + 0.0 * p
+
+    def kinematic_viscosity(self, p: Expr) -> Expr:
+        return 35e-6 + 0.0 * p
+
+
+class Warm(SimpleOil):
+    """Oil whose energy is that of another."""
+
+    def enthalpy(self, p: Expr) -> Expr:
+        return 1.01 * super().enthalpy(p)
+
+
+def test_the_laws_of_a_fluid_belong_together() -> None:
+    """A bulk modulus without its density, an enthalpy without its density, and a density without its enthalpy."""
+    check_fluid(OIL)
+    with pytest.raises(AssertionError, match=r"Steam at -0\.9 bar: bulk_modulus is 1\.4e\+09 Pa, .* inf Pa"):
+        check_fluid(Steam())
+    with pytest.raises(AssertionError, match=r"Warm at .*: the slope of enthalpy is"):
+        check_fluid(Warm(**OIL.model_dump(by_alias=True)))
+    with pytest.raises(ComponentError, match="Dense: has a density of its own and the enthalpy of SimpleOil"):
+
+        class Dense(SimpleOil):
+            """Oil with a density of its own."""
+
+            def density(self, p: Expr) -> Expr:
+                return 900.0 + 0.0 * p
 
 
 def test_a_fluid_is_asked_for() -> None:

@@ -19,7 +19,7 @@ COMPONENT = '''\
 from pydantic import Field
 
 from crescentlab.component import Component, Equations
-from crescentlab.domain import observable, takes_pressure
+from crescentlab.domain import dissipates, observable, takes_pressure
 from crescentlab.fluid import Fluid
 from crescentlab.maths import Expr, hypot, sqrt
 from crescentlab.units import Area, Flow, Pressure, Ratio
@@ -42,6 +42,7 @@ class {name}(Component):
     a = takes_pressure("upstream")
     b = takes_pressure("downstream")
     q = observable(Flow, "flow from a to b")
+    loss = dissipates()
 
     def equations(self, p_a: Expr, p_b: Expr, fluid: Fluid) -> Equations:
         drop, density = p_a - p_b, fluid.density((p_a + p_b) / 2)
