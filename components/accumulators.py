@@ -5,7 +5,7 @@ from typing import Any
 from pydantic import Field
 
 from crescentlab.component import Component, Equations
-from crescentlab.domain import gives_pressure, held, observable, state, stores
+from crescentlab.domain import gives_pressure, held, observable, state, stores, stores_energy
 from crescentlab.fluid import Fluid
 from crescentlab.maths import Expr, event_where, exp, log, when, where
 from crescentlab.units import Energy, Pressure, Ratio, Volume
@@ -23,9 +23,10 @@ class GasAccumulator(Component):
     the separator rests on the neck, and once the gas is down to V_0 times `smallest_gas` it rests at the other end; in
     both places C = 0 and the fluid alone gives way; the events `empties` and `fills` mark the stops. Stored: V_f
     \rho/\rho_0 [m^3]. `energy` [J] is the work done on the gas from P_0 on, P_0 V_0 ((V_0/V_g)^{n-1} - 1)/(n - 1) less
-    that of the atmosphere. Not for heat exchange, the real gas above 200 bar, friction, nor for fluid that leaves the
-    bladder slower than it is drawn. Source: polytropic law of a perfect gas; H. Murrenhoff, Grundlagen der
-    Fluidtechnik, chapter on hydraulic accumulators; ISO 5596 for the terms.
+    that of the atmosphere, and stays what it is at a stop; stored in all: `energy` + V_f e(p) [J]. Not for heat
+    exchange, the real gas above 200 bar, friction, nor for fluid that leaves the bladder slower than it is drawn.
+    Source: polytropic law of a perfect gas; H. Murrenhoff, Grundlagen der Fluidtechnik, chapter on hydraulic
+    accumulators; ISO 5596 for the terms.
     """
 
     volume: Volume = Field(gt=0, description="gas volume when empty of fluid, at the preload")
@@ -39,6 +40,7 @@ class GasAccumulator(Component):
     gas_volume = observable(Volume, "volume of the gas")
     gas_pressure = observable(Pressure, "gauge pressure of the gas")
     energy = observable(Energy, "work done on the gas since the preload")
+    stored_energy = stores_energy("energy of the gas and of the fluid")
     bottomed = observable(Ratio, "-1 rests empty, 1 rests full, 0 works")
     content = stores()
 
@@ -55,13 +57,15 @@ class GasAccumulator(Component):
         at_rest = event_where(empty, self.preload, full)
         fluid_volume = self.dead_volume + self.volume - gas
         swell = fluid.rho_0 / fluid.density(p)
+        work = lowest * self.volume * compression_work(self.volume / gas, n) - atmosphere * (self.volume - gas)
         return {
             "p_port": p,
             "der_p": swell * q_port / (fluid_volume / fluid.bulk_modulus(p) + compliance),
             "content": fluid_volume / swell,
             "gas_volume": gas,
             "gas_pressure": where(rests * rests > 0.5, at_rest, p),
-            "energy": lowest * self.volume * compression_work(self.volume / gas, n) - atmosphere * (self.volume - gas),
+            "energy": work,
+            "stored_energy": work + fluid_volume * fluid.energy_density(p),
             "bottomed": rests,
             "empties": when(empty),
             "fills": when(stopped),
@@ -85,8 +89,9 @@ class PistonSeparator(Component):
     p [Pa] gauge; V_a, V_b [m^3] of the two sides, together `volume` + 2 `dead_volume`; q [m^3/s] into a side, mass flow
     over \rho_0 of that side's fluid; \rho [kg/m^3], \beta [Pa] each of its own fluid, which may differ. A side that is
     used up to `dead_volume` stops the piston (`stops_at_a`, `stops_at_b`): the sides then have pressures of their own,
-    until the pressure pushes the piston off (`leaves`). Stored: V_a \rho_a/\rho_{a0} + V_b \rho_b/\rho_{b0} [m^3]. Not
-    for seal friction, nor the inertia of the piston: for those join two `piston_chamber` and a `mass_with_stops`.
+    until the pressure pushes the piston off (`leaves`). Stored: V_a \rho_a/\rho_{a0} + V_b \rho_b/\rho_{b0} [m^3];
+    energy V_a e_a(p_a) + V_b e_b(p_b) [J]. Not for seal friction, nor the inertia of the piston: for those join two
+    `piston_chamber` and a `mass_with_stops`.
     Source: Rundo & Corvaglia (2016), Eq. 2, for both sides, with p_a = p_b.
     """
 
@@ -105,6 +110,7 @@ class PistonSeparator(Component):
     at = held(Ratio, "-1 rests at side a's end, 1 at side b's, 0 free; -2 until the start is looked at", start=-2.0)
     V_b = observable(Volume, "volume of side b")
     content = stores()
+    stored_energy = stores_energy("energy of both fluids")
 
     def equations(
         self, pressure_a: Expr, pressure_b: Expr, V_a: Expr, at: Expr, q_a: Expr, q_b: Expr, fluid_a: Fluid,
@@ -127,6 +133,7 @@ class PistonSeparator(Component):
             "V_b": V_b,
             "content": V_a * fluid_a.density(pressure_a) / fluid_a.rho_0
             + V_b * fluid_b.density(pressure_b) / fluid_b.rho_0,
+            "stored_energy": V_a * fluid_a.energy_density(pressure_a) + V_b * fluid_b.energy_density(pressure_b),
             "stops_at_a": when(free & (V_a < low), V_a=low, pressure_a=common, pressure_b=common, at=-1.0),
             "stops_at_b": when(free & (V_a > high), V_a=high, pressure_a=common, pressure_b=common, at=1.0),
             "leaves": when((at == -1) & (pressure_a > pressure_b) | (at == 1) & (pressure_a < pressure_b), at=0.0),

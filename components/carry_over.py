@@ -6,6 +6,7 @@ from pydantic import Field, model_validator
 
 from crescentlab.component import Component, Equations
 from crescentlab.domain import (
+    dissipates,
     gives_pressure,
     gives_signal,
     held,
@@ -13,6 +14,8 @@ from crescentlab.domain import (
     reads_rotation,
     state,
     stores,
+    stores_energy,
+    supplies,
     takes_pressure,
     takes_signal,
 )
@@ -43,6 +46,10 @@ class CarryOverChain(Component):
     flows into it passes on to delivery. N is the whole part of extension/pitch. With N = 0 a single gap lies between
     delivery and suction at all times: an `extension` below one pitch seals for a part of each pitch only, and the
     short circuit of the rest is not modelled, so there the leakage is too small.
+
+    Stored: the sum of V \rho/\rho_0 [m^3] over the volumes that exist, energy V e(p) [J]. The tips' drag supplies
+    \rho_0 [w(p_j) - w(p_{j-1})] h H R \tau \omega/2 [W] per gap, the pressure's share of the work of moving them, which
+    is not asked of the shaft; the flow of pressure through the gaps is lost.
 
     Not for a reversed shaft, nor for a volume that changes while it is carried. Mixing with the delivery when a volume
     opens is left out (its pressure does not change the delivery's).
@@ -75,6 +82,9 @@ class CarryOverChain(Component):
         Flow, "flows over the tips from the suction side, positive towards suction", size=lambda c: c.volumes + 1
     )
     content = stores()
+    stored_energy = stores_energy("energy of the fluid in the volumes that exist")
+    loss = dissipates("power lost by leakage over the tips")
+    supply = supplies("work of the tips' drag against the pressure")
 
     def equations(
         self, p: Expr, q_chain: Expr, p_suction: Expr, p_delivery: Expr, omega_shaft: Expr, phase: Expr,
@@ -88,7 +98,9 @@ class CarryOverChain(Component):
         along = stack(p_suction, p_now, p_delivery)
         leak = slot_flow(along[1:], along[:-1], self.thickness, self.gap_height, self.gap_length, fluid)
         drag = drag_flow(self.tip_radius * self.speed_ratio * omega_shaft, self.thickness, self.gap_height)
-        q = stack(ones(N), sealed) * (leak - drag)
+        gaps = stack(ones(N), sealed)
+        q = gaps * (leak - drag)
+        rise = fluid.rho_0 * gaps * (fluid.enthalpy(along[1:]) - fluid.enthalpy(along[:-1]))
         inflow = q[1:] - q[:-1] + q_chain
         passed_on = total((1 - exists) * inflow)
         return {
@@ -100,6 +112,9 @@ class CarryOverChain(Component):
             "q_gaps": q,
             "q_tip": q[N] + total((1 - exists) * q[:-1]),
             "content": total(exists * self.volume * fluid.density(p) / fluid.rho_0),
+            "stored_energy": total(exists * self.volume * fluid.energy_density(p)),
+            "loss": total(rise * leak),
+            "supply": total(rise * drag),
             "begins": when(started == 0, closed_at=phase - within(phase, self.pitch), started=1.0),
             "closes": when(
                 (started == 1) & (turned >= self.pitch),

@@ -1,7 +1,7 @@
 """Gears of a crescent pump: the volumes they shape, their torque, and when they exist. No leakage, no pressures."""
 
 from collections.abc import Iterator
-from typing import Any, Literal, Self
+from typing import Any, ClassVar, Literal, Self
 
 from pydantic import Field, model_validator
 
@@ -36,10 +36,14 @@ class CrescentGears(Component):
     ``chambers``). ``driver_phase`` and ``driven_phase`` are phi plus a constant and pass through a whole number of
     pitches when a volume of that gear closes.
 
+    The shaft's power is all given to the chambers: none is lost or stored.
+
     Not for a reversed shaft, contact ratios of 2 and more, or profile shift. Tip and root radii default to
     m z_1/2 + 3.1 mm, m z_1/2 - 4.05 mm and m z_2/2 - 3.4 mm, m z_2/2 + 3.6 mm.
     Source: Rundo & Corvaglia (2016), Eqs. 3-16 and section 6.1.
     """
+
+    lossless: ClassVar[bool] = True
 
     driver_teeth: int = Field(default=13, ge=3, description="teeth of the driving inner gear, z_1")
     driven_teeth: int = Field(default=16, ge=4, description="teeth of the driven outer gear, z_2")

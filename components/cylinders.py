@@ -5,7 +5,17 @@ from typing import Any, Literal, Self
 from pydantic import Field, model_validator
 
 from crescentlab.component import Component, Equations
-from crescentlab.domain import gives_pressure, observable, reads_motion, state, stores, takes_motion, takes_pressure
+from crescentlab.domain import (
+    dissipates,
+    gives_pressure,
+    observable,
+    reads_motion,
+    state,
+    stores,
+    stores_energy,
+    takes_motion,
+    takes_pressure,
+)
 from crescentlab.fluid import Fluid
 from crescentlab.maths import Expr, fail_when, maximum, minimum, pi, sqrt
 from crescentlab.units import (
@@ -31,6 +41,14 @@ SMALLEST_SHARE = 1e-3
 USED_UP = "the piston has gone through its stop and used up a dead volume; raise stop_stiffness or dead volumes"
 
 
+def _stops(x: Any, v: Any, stroke: Any, stiffness: Any, restitution: Any, impact_velocity: Any) -> tuple[Any, Any, Any]:
+    """Force [N] of the stops at 0 and `stroke` towards increasing x, their strain energy [J], what they lose [W]."""
+    low, high = maximum(-x, 0.0), maximum(x - stroke, 0.0)
+    law = (stiffness, restitution, impact_velocity)
+    force = contact_force(low, -v, *law) - contact_force(high, v, *law)
+    return force, stiffness * (low * low + high * high) / 2, (stiffness * (low - high) - force) * v
+
+
 def _pressure_rate(p: Any, volume: Any, q: Any, swept: Any, fluid: Fluid) -> Any:
     """dp/dt [Pa/s] of a chamber with the flow `q` in and the rate of volume `swept`, both [m^3/s]."""
     return fluid.bulk_modulus(p) / volume * (fluid.rho_0 / fluid.density(p) * q - swept)
@@ -45,9 +63,9 @@ class SingleActingCylinder(Component):
     p [Pa, gauge] of the chamber; q [m^3/s] into it; F [N] on the rod's mass, towards increasing x; x [m] from 0 to
     `stroke`, v [m/s]; A = \pi d^2/4 [m^2], d = `piston_diameter` (for a plunger its own diameter); V_0 = `dead_volume`
     [m^3]; F_0 = `preload` [N], k = `spring_stiffness` [N/m]; B = `viscous_friction` [N s/m]; the stops at both ends are
-    those of `elastic_end_stops`; \beta [Pa], \rho [kg/m^3] at p. Stored: V \rho/\rho_0 [m^3]. Join the rod to a mass.
-    Not for a housing that moves. Source: H. E. Merritt, Hydraulic Control Systems (1967), chapter 6, valve
-    controlled piston.
+    those of `elastic_end_stops`; \beta [Pa], \rho [kg/m^3] at p. Stored: V \rho/\rho_0 [m^3]; energy V e(p) + F_0 x + k
+    x^2/2 [J] and the strain of the stops. Lost: B v^2 [W] and the stops' damping. Join the rod to a mass. Not for a
+    housing that moves. Source: H. E. Merritt, Hydraulic Control Systems (1967), chapter 6, valve controlled piston.
     """
 
     piston_diameter: Length = Field(gt=0, description="diameter of the piston")
@@ -67,13 +85,16 @@ class SingleActingCylinder(Component):
     stop_force = observable(Force, "force of the stops on the rod's mass")
     volume = observable(Volume, "volume of the chamber, negative once it would be used up")
     content = stores()
+    stored_energy = stores_energy("energy of the fluid, the spring and the stops")
+    loss = dissipates("power lost to friction and in the stops")
 
     def equations(self, pressure: Expr, q_cap: Expr, x_rod: Expr, v_rod: Expr, fluid: Fluid) -> Equations:
         area = pi / 4 * self.piston_diameter * self.piston_diameter
         volume = self.dead_volume + area * x_rod
         filled = maximum(volume, SMALLEST_SHARE * self.dead_volume)
         law = (self.stop_stiffness, self.restitution, self.impact_velocity)
-        stop = contact_force(-x_rod, -v_rod, *law) - contact_force(x_rod - self.stroke, v_rod, *law)
+        stop, strain, stop_loss = _stops(x_rod, v_rod, self.stroke, *law)
+        bent = (self.preload + self.spring_stiffness * x_rod / 2) * x_rod
         spring = self.preload + self.spring_stiffness * x_rod + self.viscous_friction * v_rod
         force = pressure * area - spring + stop
         return {
@@ -84,6 +105,8 @@ class SingleActingCylinder(Component):
             "stop_force": stop,
             "volume": volume,
             "content": filled * fluid.density(pressure) / fluid.rho_0,
+            "stored_energy": filled * fluid.energy_density(pressure) + bent + strain,
+            "loss": self.viscous_friction * v_rod * v_rod + stop_loss,
             "used_up": fail_when(volume < SMALLEST_SHARE * self.dead_volume, USED_UP),
         }
 
@@ -101,10 +124,11 @@ class DoubleActingCylinder(Component):
     `stroke`, v [m/s]; F [N] on the rod's mass, towards increasing x; A = \pi (d^2 - d_r^2)/4 [m^2] with d =
     `piston_diameter`, d_r = `rod_diameter` on side 2, `cap_rod_diameter` on side 1 (a rod through both ends); V_0 dead
     volumes [m^3]; G = `leakage_conductance` [m^3/(s Pa)]; B = `viscous_friction` [N s/m]; the stops are those of
-    `elastic_end_stops`; \beta [Pa], \rho [kg/m^3] of each chamber. Stored: the sum of V \rho/\rho_0 [m^3]. Join the rod
-    to a mass, dry friction beside it (`friction_between`, `stick_slip_mass`), and cushions between chamber and pipe
-    (`cushion`). Not for a housing that moves. Source: H. E. Merritt, Hydraulic Control Systems (1967), chapter 6,
-    valve controlled piston.
+    `elastic_end_stops`; \beta [Pa], \rho [kg/m^3] of each chamber. Stored: the sum of V \rho/\rho_0 [m^3]; energy V_1
+    e(p_1) + V_2 e(p_2) [J] and the strain of the stops. Lost: B v^2, the leakage's \rho_0 q_l (w(p_1) - w(p_2)) [W] and
+    the stops' damping. Join the rod to a mass, dry friction beside it (`friction_between`, `stick_slip_mass`), and
+    cushions between chamber and pipe (`cushion`). Not for a housing that moves. Source: H. E. Merritt, Hydraulic
+    Control Systems (1967), chapter 6, valve controlled piston.
     """
 
     piston_diameter: Length = Field(gt=0, description="diameter of the piston")
@@ -129,6 +153,8 @@ class DoubleActingCylinder(Component):
     leakage = observable(Flow, "flow past the piston, from cap to rod")
     smallest = observable(Volume, "volume of the smaller chamber, negative once it would be used up")
     content = stores()
+    stored_energy = stores_energy("energy of the fluid in both chambers and of the stops")
+    loss = dissipates("power lost to friction, leakage and in the stops")
 
     @model_validator(mode="after")
     def _rods_are_thinner(self) -> Self:
@@ -152,9 +178,10 @@ class DoubleActingCylinder(Component):
         V_1 = maximum(left_1, SMALLEST_SHARE * self.cap_dead_volume)
         V_2 = maximum(left_2, SMALLEST_SHARE * self.rod_dead_volume)
         law = (self.stop_stiffness, self.restitution, self.impact_velocity)
-        stop = contact_force(-x_rod, -v_rod, *law) - contact_force(x_rod - self.stroke, v_rod, *law)
+        stop, strain, stop_loss = _stops(x_rod, v_rod, self.stroke, *law)
         force = p_1 * area_1 - p_2 * area_2 - self.viscous_friction * v_rod + stop
         leakage = self.leakage_conductance * (p_1 - p_2)
+        throttled = fluid.rho_0 * leakage * (fluid.enthalpy(p_1) - fluid.enthalpy(p_2))
         used = (left_1 < SMALLEST_SHARE * self.cap_dead_volume) | (left_2 < SMALLEST_SHARE * self.rod_dead_volume)
         return {
             "p_cap": p_1,
@@ -167,6 +194,8 @@ class DoubleActingCylinder(Component):
             "leakage": leakage,
             "smallest": minimum(left_1, left_2),
             "content": (V_1 * fluid.density(p_1) + V_2 * fluid.density(p_2)) / fluid.rho_0,
+            "stored_energy": V_1 * fluid.energy_density(p_1) + V_2 * fluid.energy_density(p_2) + strain,
+            "loss": self.viscous_friction * v_rod * v_rod + throttled + stop_loss,
             "used_up": fail_when(used, USED_UP),
         }
 
@@ -206,6 +235,7 @@ class Cushion(Component):
     rod = reads_motion("the piston")
     q = observable(Flow, "flow from the chamber to the port")
     open_area = observable(Area, "flow area")
+    loss = dissipates()
 
     @model_validator(mode="after")
     def _narrows(self) -> Self:

@@ -1,6 +1,6 @@
 """Gears of an external gear machine: the volumes they shape, their torque and phases. No leakage, no pressures."""
 
-from typing import Any, Self
+from typing import Any, ClassVar, Self
 
 from pydantic import Field, model_validator
 
@@ -32,10 +32,14 @@ class ExternalGears(Component):
     through a whole number of pitches when a space of that gear closes, for two `carry_over_chain` of `space` [m^3]
     volumes.
 
+    The shaft's power is all given to the chambers: none is lost or stored.
+
     Not for gears of different size, profile shift, a reversed shaft, or gears without relief grooves. Source: J.
     Ivantysyn, M. Ivantysynova, Hydrostatic Pumps and Motors (2001), external gear machines; N. D. Manring,
     S. B. Kasaragadda, J. Dyn. Syst. Meas. Control 125 (2003) 396-404, the theoretical flow ripple.
     """
+
+    lossless: ClassVar[bool] = True
 
     teeth: int = Field(default=12, ge=6, description="teeth of each gear, z")
     module: Length = Field(gt=0, description="module")

@@ -1,18 +1,21 @@
 """Axial piston machines: the barrel that strokes the pistons, their chambers, the valve plate that joins them."""
 
-from typing import Any, Self
+from typing import Any, ClassVar, Self
 
 import numpy as np
 from pydantic import Field, model_validator
 
 from crescentlab.component import Component, Equations
 from crescentlab.domain import (
+    dissipates,
     gives_chamber,
     gives_pressure,
     observable,
     reads_rotation,
     state,
     stores,
+    stores_energy,
+    supplies,
     takes_chamber,
     takes_pressure,
     takes_rotation,
@@ -46,6 +49,8 @@ class SwashPlateBarrel(Component):
     torque on the plate. Source: J. Ivantysyn, M. Ivantysynova, Hydrostatic Pumps and Motors (2001), kinematics of swash
     plate machines and non-uniformity of flow; N. D. Manring, J. Dyn. Syst. Meas. Control 122 (2000) 263-268.
     """
+
+    lossless: ClassVar[bool] = True
 
     pistons: int = Field(default=9, ge=1, description="number of pistons, z")
     piston_diameter: Length = Field(gt=0, description="diameter of a piston")
@@ -86,9 +91,9 @@ class VariableSwashPlateBarrel(Component):
     s [-] = tan of the swash angle over that of \beta_m = `largest_swash_angle` [rad]; u [-] the signal `setting`, held
     within -1 and 1; \tau = `lag` [s] of the actuator, which imposes the motion whatever the force of the pistons; V_0 =
     `dead_volume` [m^3] at the inner dead centre of the full stroke, the plate tilting about the middle of the strokes;
-    V [m^3], A [m^2], R [m], \alpha [rad], T [N m], p [Pa, gauge] as in `swash_plate_barrel`. Not for the control force
-    of the plate. Source: J. Ivantysyn, M. Ivantysynova, Hydrostatic Pumps and Motors (2001), kinematics of swash plate
-    machines.
+    V [m^3], A [m^2], R [m], \alpha [rad], T [N m], p [Pa, gauge] as in `swash_plate_barrel`. Supplied by the actuator:
+    -A R \tan\beta_m \dot s \sum_i p_i \cos\alpha_i [W]; none is lost. Not for the control force of the plate. Source:
+    J. Ivantysyn, M. Ivantysynova, Hydrostatic Pumps and Motors (2001), kinematics of swash plate machines.
     """
 
     pistons: int = Field(default=9, ge=1, description="number of pistons, z")
@@ -106,6 +111,7 @@ class VariableSwashPlateBarrel(Component):
     share = state(Ratio, "share of the largest displacement", start="start_setting", nominal=1.0)
     torque = observable(Torque, "torque of the shaft on the barrel, positive while pumping")
     displacement = observable(Displacement, "volume displaced per shaft angle")
+    supply = supplies("power of the actuator that changes the strokes")
 
     def equations(self, phi_shaft: Expr, omega_shaft: Expr, p_chambers: Expr, setting: Expr, share: Expr) -> Equations:
         angles = piston_angles(phi_shaft, self.start_angle, self.pistons)
@@ -114,13 +120,15 @@ class VariableSwashPlateBarrel(Component):
         moves = (minimum(maximum(setting, -1.0), 1.0) - share) / self.lag
         rates = -half_stroke_volume * share * sin(angles)
         torque = -total(p_chambers * rates)
+        swivelling = half_stroke_volume * moves * cos(angles)
         return {
             "V_chambers": self.dead_volume + half_stroke_volume * (1 + share * cos(angles)),
-            "dV_chambers": rates * omega_shaft + half_stroke_volume * moves * cos(angles),
+            "dV_chambers": rates * omega_shaft + swivelling,
             "der_share": moves,
             "torque_shaft": torque,
             "torque": torque,
             "displacement": self.pistons * half_stroke_volume * share / pi,
+            "supply": -total(p_chambers * swivelling),
         }
 
 
@@ -130,8 +138,8 @@ class PistonChambers(Component):
     .. math:: \frac{dp_i}{dt} = \frac{\beta}{V_i} \left(\frac{\rho_0}{\rho} q_i - \dot V_i\right)
 
     p [Pa, gauge]; V [m^3] > 0, \dot V [m^3/s] of each chamber from the barrel; q [m^3/s] into it; \rho [kg/m^3], \beta
-    [Pa] at p. Stored: the sum of V \rho/\rho_0 [m^3]. Not for a single chamber (`variable_capacity`). Source: Rundo &
-    Corvaglia (2016), Eq. 2, with \rho_0/\rho because q is a mass flow.
+    [Pa] at p. Stored: the sum of V \rho/\rho_0 [m^3], energy V e(p) [J]. Not for a single chamber
+    (`variable_capacity`). Source: Rundo & Corvaglia (2016), Eq. 2, with \rho_0/\rho because q is a mass flow.
     """
 
     pistons: int = Field(default=9, ge=1, description="number of pistons")
@@ -141,6 +149,7 @@ class PistonChambers(Component):
     chambers = takes_chamber("the barrel that shapes them", size="pistons")
     p = state(Pressure, "pressures", start="start_pressure", nominal=1e5, size="pistons")
     content = stores()
+    stored_energy = stores_energy("energy of the fluid in all chambers")
 
     def equations(self, p: Expr, q_port: Expr, V_chambers: Expr, dV_chambers: Expr, fluid: Fluid) -> Equations:
         swell = fluid.rho_0 / fluid.density(p)
@@ -149,6 +158,7 @@ class PistonChambers(Component):
             "p_chambers": p,
             "der_p": fluid.bulk_modulus(p) / V_chambers * (swell * q_port - dV_chambers),
             "content": total(V_chambers / swell),
+            "stored_energy": total(V_chambers * fluid.energy_density(p)),
         }
 
 
@@ -192,6 +202,7 @@ class ValvePlate(Component):
     q_suction_port = observable(Flow, "flow from the suction port to the chambers")
     delivery_areas = observable(Area, "flow areas to the delivery port", size="pistons")
     suction_areas = observable(Area, "flow areas to the suction port", size="pistons")
+    loss = dissipates()
 
     @model_validator(mode="after")
     def _ports_fit(self) -> Self:

@@ -12,12 +12,13 @@ import pytest
 from building import OIL, circuit, fired
 from crescentlab.components.accumulators import GasAccumulator, compression_work
 from crescentlab.components.cavitating_fluids import MineralOil, Water
-from crescentlab.components.fluids import SimpleOil
+from crescentlab.components.fluids import AeratedOil, SimpleOil
 from refusing import Refusal
 from scipy.integrate import quad
 from scipy.optimize import brentq
 
 import crescentlab as cl
+from crescentlab.contract import Case, check_energy
 from crescentlab.result import Result
 
 BAR, LPM, ATM, BETA = 1e5, 1e-3 / 60, 101325.0, 1.4e9
@@ -99,6 +100,38 @@ def test_charged_and_emptied_it_is_as_before() -> None:
     assert result["store.p"][-1] == pytest.approx(BETA * math.log(left / 10e-6), abs=2 * BAR)
 
 
+def test_the_gas_keeps_its_energy_at_its_stops() -> None:
+    """None below the preload; beyond the full stop P_0 V_0 (0.7^-0.4 - 1)/0.4 less the atmosphere's work."""
+    result = filled_and_emptied()
+    most = (50 * BAR + ATM) * 1e-3 * (0.7**-0.4 - 1) / 0.4 - ATM * 0.3e-3
+    assert result["store.energy"][[0, -1]] == pytest.approx([0.0, 0.0], abs=1e-9)
+    row = int(np.argmax(result["store.p"]))
+    p = float(result["store.p"][row])
+    assert result["store.energy"][row] == pytest.approx(most, rel=1e-12)
+    oil = 0.31e-3 * (BETA * math.expm1(p / BETA) - p)
+    assert result["store.stored_energy"][row] == pytest.approx(most + oil, rel=1e-9)
+    assert energy_error(result) < 1e-6
+
+
+def energy_error(result: Result) -> float:
+    """Largest error of a component's ledger of energy."""
+    assert result.balance is not None
+    assert result.balance.energy is not None
+    assert not result.balance.energy.silent
+    return max(result.balance.energy.components.values())
+
+
+@pytest.mark.parametrize("p", [(-0.5 * BAR, 45 * BAR), (51 * BAR, 80 * BAR), (85 * BAR, 200 * BAR)])
+@pytest.mark.parametrize("index", [1.0, 1.4])
+def test_what_enters_is_stored(index: float, p: tuple[float, float]) -> None:
+    """Empty, working and full, with oil that holds air."""
+    part = GasAccumulator(volume=1e-3, preload=50 * BAR, polytropic_index=index, smallest_gas=0.7)
+    oil = AeratedOil(
+        density=860.0, kinematic_viscosity=35e-6, bulk_modulus=BETA, air_fraction=0.01, saturation_pressure=1e8
+    )
+    check_energy(Case(part, oil, {"p": p}))
+
+
 @pytest.mark.parametrize("index", [1.0, 1 + 1e-9, 1 + 1e-5, 1.4])
 def test_compression_work_is_smooth_at_the_isotherm(index: float) -> None:
     """Integral of v^-n from 1/r to 1 by quadrature, through n = 1."""
@@ -170,6 +203,19 @@ def test_discharge_of_the_shipped_circuit() -> None:
     assert at(result, "accumulator.p", empties + 1e-3) < 0.1 * BAR
     assert result.balance is not None
     assert result.balance.circuit < 1e-6
+
+
+def test_the_shipped_accumulator_gives_back_what_it_took() -> None:
+    """Pump's work = what is stored after the charge = heat in the valve after the discharge; to 1e-9 with radau."""
+    result = cl.load("accumulator").simulate(solver="radau", rtol=1e-9)
+    assert energy_error(result) < 1e-9
+    assert result.balance is not None
+    energy = result.balance.energy
+    assert energy is not None
+    stored = result["accumulator.stored_energy"]
+    charged = at(result, "accumulator.stored_energy", 2.5) - stored[0]
+    assert energy.supplied == pytest.approx(charged, rel=1e-9)
+    assert energy.dissipated["valve"] == pytest.approx(charged + stored[0] - stored[-1], rel=1e-9)
 
 
 # -- elastic walls -----------------------------------------------------------------------------------------------------
@@ -266,6 +312,7 @@ def test_separator_stops() -> None:
     assert result["piston.pressure_b"][-1] < 1.0
     assert result.balance is not None
     assert result.balance.circuit < 1e-6
+    assert energy_error(result) < 1e-6
 
 
 def test_separator_leaves_its_stop() -> None:
@@ -293,6 +340,7 @@ def test_separator_leaves_its_stop() -> None:
     assert np.abs(result["piston.pressure_a"] - result["piston.pressure_b"])[free].max() < 100.0
     assert result.balance is not None
     assert result.balance.circuit < 1e-6
+    assert energy_error(result) < 1e-6
 
 
 TWO_FLUIDS = """\

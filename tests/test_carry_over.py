@@ -7,7 +7,9 @@ from crescentlab.components.crescent_gears import CrescentGears
 from crescentlab.components.trapped_volume import TrappedVolume
 from pydantic import ValidationError
 
+from crescentlab.contract import Case, check_energy
 from crescentlab.fluid import Fluid
+from crescentlab.maths import exp
 
 DEG = np.pi / 180
 PITCH = 2 * np.pi / 13
@@ -19,7 +21,7 @@ class Oil(Fluid):
     """860 kg/m3, 35 cSt at every pressure; beta 5000 bar for small changes."""
 
     def density(self, p):
-        return 860.0 * np.exp(p / 5e8)
+        return 860.0 * exp(p / 5e8)
 
     def bulk_modulus(self, p):
         return 5e8 + 0.0 * p
@@ -128,6 +130,29 @@ def test_flows_change_the_content(volumes, extension, phase):
     assert flows == pytest.approx(rate, rel=1e-6, abs=1e-15)
 
 
+@pytest.mark.parametrize("phase", [1.0, 20.0])
+@pytest.mark.parametrize(("volumes", "extension"), [(0, 20), (1, 34), (2, 60), (4, 115)])
+def test_what_enters_is_stored_or_lost(volumes, extension, phase):
+    """While the last volume exists and while it is open, with drag either way."""
+    turned = (phase * DEG, phase * DEG)
+    check_energy(
+        Case(chain(volumes, extension * DEG), OIL, {"phase": turned, "closed_at": (0, 0), "omega_shaft": (-300, 300)})
+    )
+
+
+def test_drag_works_against_the_whole_rise():
+    """Brought: h H R omega/2 times p_d - p_s over all sealed tips, whatever lies between them; lost is each drop's."""
+    p = [1 * BAR, 4 * BAR]
+    found = at(chain(2, 60 * DEG), 1 * DEG, p=p)
+    w = [5e8 / 860 * -np.expm1(-x / 5e8) for x in (0.0, *p, 5 * BAR)]  # enthalpy of this oil
+    assert found["supply"] == pytest.approx(860 * DRIVER_DRAG * w[-1], rel=2e-6)
+    rises = 860 * np.diff(w) * np.diff([0.0, *p, 5 * BAR]) * DRIVER_GAP
+    assert found["loss"] == pytest.approx(rises.sum(), rel=2e-3)  # viscosity at each gap's mean pressure
+    opened = at(chain(2, 60 * DEG), 20 * DEG, p=p)
+    assert opened["supply"] == pytest.approx(found["supply"], rel=1e-6)
+    assert opened["stored_energy"] == pytest.approx(566.75e-9 * (5e8 * np.expm1(BAR / 5e8) - BAR), rel=1e-6)
+
+
 def test_chain_shifts_by_one_place():
     """A new volume closes with the suction's pressure, the others move up, the last is gone to delivery."""
     event = at(chain(4, 115 * DEG), PITCH + 1e-9, p=[1e5, 2e5, 3e5, 4e5], p_suction=-1e4)["closes"]
@@ -232,3 +257,9 @@ def test_trapped_content_follows_its_flow():
     dt, rate = 1e-7, trapped(1.0)["der_p_own"]
     later, earlier = (trapped(1.0, p_own=8 * BAR + s * dt * rate, V=40e-9 - s * dt * 2e-6)["content"] for s in (1, -1))
     assert (later - earlier) / (2 * dt) == pytest.approx(1e-6, rel=1e-6)
+
+
+@pytest.mark.parametrize(("exists", "grows"), [(1.0, (-1e-5, 1e-5)), (0.0, (0.0, 0.0))])
+def test_trapped_volume_stores_what_enters(exists, grows):
+    """While it exists the flow and the gears' work; while it does not, its flow leaves to delivery with its power."""
+    check_energy(Case(TrappedVolume(), OIL, {"exists": (exists, exists), "dV_chamber": grows}))

@@ -6,14 +6,18 @@ import numpy as np
 import pytest
 from building import circuit
 from crescentlab.components.cylinders import Cushion, DoubleActingCylinder, SingleActingCylinder
-from crescentlab.components.fluids import SimpleOil
+from crescentlab.components.fluids import AeratedOil, SimpleOil
 from pydantic import ValidationError
 
+from crescentlab.contract import Case, check_energy
 from crescentlab.errors import SimulationError
 
 BAR, LPM = 1e5, 1e-3 / 60
 OIL = SimpleOil(density=850.0, kinematic_viscosity=30e-6, bulk_modulus=1.4e9)
 FLUID = {"type": "simple_oil", "density": "850 kg/m^3", "kinematic_viscosity": "30 cSt", "bulk_modulus": "1.4 GPa"}
+AERATED = AeratedOil(
+    density=850.0, kinematic_viscosity=30e-6, bulk_modulus=1.4e9, air_fraction=0.005, saturation_pressure=1e8
+)
 SIZES = {
     "piston_diameter": 0.05, "rod_diameter": 0.03, "stroke": 0.4, "cap_dead_volume": 50e-6, "rod_dead_volume": 40e-6,
 }  # fmt: skip
@@ -66,6 +70,42 @@ def test_stops_never_pull():
     assert now(part, x=0.4001, v=-5.0)["stop_force"] == 0
 
 
+@pytest.mark.parametrize("fluid", [OIL, AERATED], ids=["simple", "aerated"])
+@pytest.mark.parametrize("x", [(-2e-4, 0.0), (0.01, 0.39), (0.4, 0.4002)])
+def test_what_enters_is_stored_or_lost(x, fluid):
+    """In both stops, also as the piston leaves faster than their damping allows, and between; with all that it has."""
+    law = {"viscous_friction": 300.0, "stop_stiffness": 1e8, "restitution": 0.5, "impact_velocity": 0.1}
+    double = DoubleActingCylinder(**SIZES, **law, cap_rod_diameter=0.02, leakage_conductance=1e-12)
+    single = SingleActingCylinder(
+        piston_diameter=0.05, stroke=0.4, dead_volume=50e-6, preload=500.0, spring_stiffness=2e3, **law
+    )
+    for part in (double, single):
+        check_energy(Case(part, fluid, {"x_rod": x, "v_rod": (-1.0, 1.0)}))
+        check_energy(Case(part, fluid, {"x_rod": x, "v_rod": (-0.05, 0.05)}))
+
+
+def test_stop_gives_back_what_it_does_not_lose():
+    """Driven into its low stop by 0.1 mm and out again at 0.05 m/s: lost k d^2/2 a v in, as much out, a = 7.5 s/m."""
+    parts = {
+        "cylinder": {"type": "single_acting_cylinder", "piston_diameter": "40 mm", "stroke": "100 mm",
+                     "dead_volume": "20 cm^3"},
+        "hand": {"type": "motion_source", "velocity": "-50 mm/s"},
+        "vent": {"type": "atmospheric_vent"},
+        "way": {"type": "orifice", "area": "1 m^2"},
+    }  # fmt: skip
+    nets = {"p": ["cylinder.cap", "way.a"], "r": ["hand.port", "cylinder.rod"], "v": ["way.b", "vent.port"]}
+    lost = 1e8 * 1e-4**2 / 2 * 7.5 * 0.05
+    for velocity, start, held in (("-50 mm/s", "0 mm", 1.0), ("50 mm/s", "-0.1 mm", -1.0)):
+        changed = {"hand.velocity": velocity, "hand.position": start}
+        run = circuit(components=parts, nets=nets, fluid=FLUID, simulation={"stop": "2 ms"}).simulate(
+            parameters=changed, rtol=1e-9
+        )
+        energy = run.balance.energy
+        assert energy.dissipated["cylinder"] == pytest.approx(lost, rel=1e-6)
+        assert energy.stored == pytest.approx(held * 0.5, rel=1e-4)  # the oil holds next to nothing
+        assert max(energy.components.values()) < 1e-8
+
+
 def test_rod_through_both_ends_is_symmetric():
     """Equal rods: turned round, the force turns round."""
     sizes = SIZES | {"cap_rod_diameter": 0.03, "rod_dead_volume": 50e-6}
@@ -112,6 +152,7 @@ def test_differential_speeds_and_stop():
     assert run["load.x"][-1] == pytest.approx(0.4 + run["cylinder.cap_pressure"][-1] * CAP / 1e8, rel=1e-6)
     assert run["load.v"][-1] == pytest.approx(0.0, abs=1e-6)
     assert run.balance.circuit < 1e-6
+    assert max(run.balance.energy.components.values()) < 1e-6
 
 
 def test_spring_returns_the_single_acting_cylinder():
@@ -131,6 +172,7 @@ def test_spring_returns_the_single_acting_cylinder():
     assert run["load.x"][-1] == pytest.approx(-500 / (1e8 + 2e3), rel=1e-3)
     assert np.all(run["load.v"][run["load.x"] > 1e-4] <= 0)
     assert run.balance.circuit < 1e-6
+    assert max(run.balance.energy.components.values()) < 1e-6
 
 
 def test_piston_through_its_stop_ends_the_run():

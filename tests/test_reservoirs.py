@@ -7,8 +7,10 @@ import math
 import numpy as np
 import pytest
 from building import OIL, circuit
+from crescentlab.components.fluids import AeratedOil
 from crescentlab.components.reservoirs import Reservoir
 
+from crescentlab.contract import Case, check_energy
 from crescentlab.errors import SimulationError
 from crescentlab.result import Result
 
@@ -40,6 +42,32 @@ def test_pressures_at_its_ports() -> None:
     result = drawn("1 L/min", "1 L/min", stop="1 s", surface_pressure="0.2 bar", outlet_height="0.1 m")
     assert result["tank.outlet.p"][-1] == pytest.approx(0.2 * BAR + 860 * G * 0.3, rel=1e-9)
     assert result["high.p"][-1] == pytest.approx(0.2 * BAR, rel=1e-12)
+
+
+@pytest.mark.parametrize("surface", [-0.3 * BAR, 0.0, 2 * BAR])
+def test_what_enters_is_stored(surface: float) -> None:
+    """Above and below 0 bar on the surface, with two inlets and oil that holds air: the head compresses it."""
+    part = Reservoir(area=0.01, height=2.0, start_level=1.0, outlet_height=0.1, surface_pressure=surface, inlets=2)
+    oil = AeratedOil(
+        density=860.0, kinematic_viscosity=35e-6, bulk_modulus=1.4e9, air_fraction=0.01, saturation_pressure=1e8
+    )
+    check_energy(Case(part, oil, {"h": (0.1, 2.0)}))
+
+
+def test_returned_oil_brings_its_height() -> None:
+    """4 L/min come back above the level, which falls from 0.4 m by 33.3 mm/min less q t/A: rho g times integral of h q.
+
+    Oil under 0.4 m is compressed by 1e-6. The pump at the outlet takes out rho g h times its 6 L/min.
+    """
+    result = drawn("6 L/min", "4 L/min")
+    assert result.balance is not None
+    energy = result.balance.energy
+    assert energy is not None
+    mean = 0.3  # of a level that falls evenly from 0.4 to 0.2 m
+    assert energy.stored == pytest.approx(860 * G * 0.01 / 2 * (0.2**2 - 0.4**2), rel=1e-5)
+    brought = energy.supplied + 860 * G * mean * 6e-3  # the flow sources supply too: -p q at the outlet, 0 above
+    assert brought == pytest.approx(860 * G * mean * 4e-3, rel=1e-5)
+    assert max(energy.components.values()) < 1e-9
 
 
 def test_inlets_are_optional() -> None:

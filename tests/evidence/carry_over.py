@@ -63,3 +63,30 @@ def contacts() -> list[Number]:
         ]  # fmt: skip
         found.append(Number(f"{degrees} deg", expected, float(np.mean(sealed))))
     return found
+
+
+@evidence(
+    "carry_over_chain",
+    source="power of a flow through a drop, dp q: plane Poiseuille flow loses it, the drag h H R omega/2 of the moving "
+    "tip brings it (Rundo & Corvaglia (2016), Eq. 24)",
+    tolerance=2e-6,
+    because="the expected values are rounded to seven digits; the oil yields by 1e-6",
+)
+def powers() -> list[Number]:
+    """The same driver: lost by leakage over both tips, brought by their drag, and energy of the volume at 200 bar."""
+    part = CarryOverChain(
+        volumes=1, volume=566.75e-9, pitch=2 * math.pi / 13, extension=34 * DEGREE, gap_height=150e-6,
+        gap_length=2.149e-3, thickness=13e-3, tip_radius=29.1e-3,
+    )  # fmt: skip
+    given = {"q_chain": np.zeros(1), "p_suction": 0.0, "p_delivery": 5 * BAR, "omega_shaft": 2000 * math.pi / 30}
+    given |= {"phase": DEGREE, "closed_at": 0.0, "started": 1.0}
+    now = part.equations(p=np.array([2 * BAR]), fluid=OIL, **given)
+    soft = SimpleOil(density=860.0, kinematic_viscosity=35e-6, bulk_modulus=1.4e9)
+    full = part.equations(p=np.array([200 * BAR]), fluid=soft, **given)
+    gap, drag = 5.652401e-11, 5.942323e-6
+    held = 566.75e-9 * (1.4e9 * math.expm1(200 * BAR / 1.4e9) - 200 * BAR)
+    return [
+        Number("lost, (2^2 + 3^2) bar^2 H h^3/(12 mu l)", 13 * BAR**2 * gap, now["loss"], "W"),
+        Number("brought by the drag, 5 bar h H R omega/2", 5 * BAR * drag, now["supply"], "W"),
+        Number("energy at 200 bar", held, full["stored_energy"], "mJ"),
+    ]

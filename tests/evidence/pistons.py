@@ -59,3 +59,30 @@ def hydraulic_spring() -> list[Number]:
     expected = math.sqrt(4 * 1.4e9 * (math.pi / 4 * (40 * MM) ** 2) ** 2 / (2e-4 * 100))
     swing = max(mode.natural_frequency for mode in found)
     return [Number("frequency", expected / 2 / math.pi, swing / 2 / math.pi, "Hz")]
+
+
+@evidence(
+    "piston_chamber",
+    source="work on a closed volume of oil with rho = rho_0 exp(p/beta): V (beta (exp(p/beta) - 1) - p), p = beta "
+    "ln(V_0/V)",
+    tolerance=1e-7,
+    because="relative tolerance of the run, 1e-9",
+)
+def squeezed() -> list[Number]:
+    """A rod squeezes 100 cm^3 behind a piston of 40 mm by 1 mm: its work, all of it in the oil."""
+    parts = {
+        "hand": {"type": "motion_source", "velocity": "-100 mm/s"},
+        "piston": {"type": "piston_chamber", "diameter": "40 mm", "dead_volume": "100 cm^3"},
+        "oil": {"type": "variable_capacity"}, "end": {"type": "plug"},
+    }  # fmt: skip
+    nets = {"r": ["hand.port", "piston.rod"], "c": ["piston.chamber", "oil.chamber"], "n": ["oil.port", "end.port"]}
+    run = circuit(components=parts, nets=nets, fluid=OIL, simulation={"stop": "10 ms"}).simulate(rtol=1e-9)
+    assert run.balance is not None
+    assert run.balance.energy is not None
+    left = 1e-4 - math.pi / 4 * (40 * MM) ** 2 * MM
+    p = 1.4e9 * math.log(1e-4 / left)
+    work = left * (1.4e9 * math.expm1(p / 1.4e9) - p)
+    return [
+        Number("work of the rod", work, run.balance.energy.supplied, "J"),
+        Number("energy of the oil", work, float(run["oil.stored_energy"][-1]), "J"),
+    ]

@@ -48,3 +48,27 @@ def head() -> list[Number]:
     part = Reservoir(area=1.0, height=2.0, start_level=1.1, outlet_height=0.1)
     found = part.equations(h=1.1, q_outlet=0.0, q_inlet=[], fluid=fluid)["p_outlet"]
     return [Number("pressure", 1000 * G, found, "bar")]
+
+
+@evidence(
+    "reservoir",
+    source="energy of height, rho g A (h_0^2 - h_1^2)/2, all of it lost in the hole (Torricelli 1644)",
+    tolerance=1e-7,
+    because="relative tolerance of the run, 1e-8",
+)
+def lost_in_the_hole() -> list[Number]:
+    """100 cm^2 of water emptied from 0.4 m through 20 mm^2 for 120 s: lost, and what is left above the outlet."""
+    parts = {
+        "water": {"type": "reservoir", "area": "100 cm^2", "height": "0.5 m", "start_level": "0.4 m"},
+        "hole": {"type": "orifice", "area": "20 mm^2"},
+        "out": {"type": "atmospheric_vent"},
+    }
+    nets = {"bottom": ["water.outlet", "hole.a"], "end": ["hole.b", "out.port"]}
+    run = circuit(components=parts, nets=nets, fluid=WATER, simulation={"stop": "120 s"}).simulate(rtol=1e-8)
+    assert run.balance is not None
+    assert run.balance.energy is not None
+    left = float(run["water.h"][-1])
+    return [
+        Number("lost", 1000 * G * 0.01 / 2 * (0.16 - left * left), run.balance.energy.dissipated["hole"], "J"),
+        Number("left", 1000 * G * 0.01 / 2 * left * left, float(run["water.stored_energy"][-1]), "J"),
+    ]
