@@ -54,9 +54,10 @@ class FixedDisplacementPump(_Rated, Component):
     [Pa, gauge]; C_s = `leakage_coefficient`, C_d = `drag_coefficient`, C_f = `friction_coefficient` [-]; T_c =
     `friction_torque` [N m]; \omega_t = `creep_speed` [rad/s]; \mu [Pa s], \rho [kg/m^3] at the mean pressure: there D
     is measured, so that the shaft's work without losses is that of compressing and moving the oil, to (\Delta
-    p/\beta)^2/24 of it, which is then in the loss. The law holds in all four quadrants. Not for ripple (`swash_plate_barrel`, `crescent_gears`), a
-    starved inlet, or leakage to a case: join a `laminar_gap` from the outlet to the case. Source: W. E. Wilson,
-    Positive-Displacement Pumps and Fluid Motors (1950); H. E. Merritt, Hydraulic Control Systems (1967), chapter 4.
+    p/\beta)^2/24 of it, which is then in the loss. The law holds in all four quadrants. Not for ripple
+    (`swash_plate_barrel`, `crescent_gears`), a starved inlet, or leakage to a case: join a `laminar_gap` from the
+    outlet to the case. Source: W. E. Wilson, Positive-Displacement Pumps and Fluid Motors (1950); H. E. Merritt,
+    Hydraulic Control Systems (1967), chapter 4.
     """
 
     inlet = takes_pressure("inlet")

@@ -102,62 +102,6 @@ class MassWithStops(Component):
         }
 
 
-class StickSlipMass(Component):
-    r"""Mass with dry friction against the ground, which sticks exactly and breaks away by events.
-
-    .. math:: m \frac{dv}{dt} = \sum f - F_c\,\mathrm{sign}\,v \quad (v \ne 0), \qquad
-              v = 0 \text{ while } \left|\sum f\right| \le F_s
-
-    m = `mass` [kg]; x [m], v [m/s]; f [N] on the mass; F_c = `coulomb_friction`, F_s = `static_friction` [N].
-    When v crosses zero the mass sticks, or slides on backwards if |f| > F_s at that instant; it breaks away when
-    |f| > F_s. Friction forces do not depend on speed while sliding. Not for the Stribeck curve, nor for friction
-    between two moving parts. Source: Coulomb's law of friction; Karnopp, J. Dyn. Syst. Meas. Control 107 (1985)
-    100-103, with the zero-velocity band replaced by an event.
-    """
-
-    mass: units.Mass = Field(gt=0, description="moving mass")
-    coulomb_friction: Force = Field(ge=0, description="friction force while sliding")
-    static_friction: Force = Field(ge=0, description="largest friction force while sticking; at least coulomb_friction")
-
-    port = gives_motion("the mass")
-    x = state(Length, "position", start=0.0, nominal=1e-3)
-    v = state(Velocity, "velocity", start=0.0, nominal=1e-2)
-    direction = held(Ratio, "1 slides up, -1 slides down, 0 sticks; 2 until the start is looked at", start=2.0)
-    sticking = observable(Ratio, "1 while the mass sticks, 0 while it slides")
-    friction = observable(Force, "friction force on the mass")
-    kinetic_energy = stores_energy("kinetic energy")
-    loss = dissipates()
-
-    @model_validator(mode="after")
-    def _static_is_larger(self) -> Self:
-        if self.static_friction < self.coulomb_friction:
-            raise ValueError(
-                f"static_friction ({self.static_friction:g} N) must be at least coulomb_friction "
-                f"({self.coulomb_friction:g} N)"
-            )
-        return self
-
-    def equations(self, x: Expr, v: Expr, direction: Expr, f_port: Expr) -> Equations:
-        sticks = direction == 0
-        slides = (direction == 1) | (direction == -1)
-        friction = where(slides, -direction * self.coulomb_friction, -f_port)
-        onward = where(f_port > self.static_friction, 1.0, where(f_port < -self.static_friction, -1.0, 0.0))
-        return {
-            "x_port": x,
-            "v_port": v,
-            "der_x": v,
-            "der_v": where(slides, (f_port - direction * self.coulomb_friction) / self.mass, 0.0),
-            "sticking": where(slides, 0.0, 1.0),
-            "friction": friction,
-            "kinetic_energy": self.mass * v * v / 2,
-            "loss": -friction * v,
-            "stops": when((direction == 1) & (v < 0) | (direction == -1) & (v > 0), v=0.0, direction=onward),
-            "breaks_away_up": when(sticks & (f_port > self.static_friction), direction=1.0),
-            "breaks_away_down": when(sticks & (f_port < -self.static_friction), direction=-1.0),
-            "starts": when(direction == 2, direction=where(v > 0, 1.0, where(v < 0, -1.0, 0.0))),
-        }
-
-
 class Spring(Component):
     r"""Linear spring against the ground; it pushes its rod towards decreasing x.
 

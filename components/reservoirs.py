@@ -1,5 +1,7 @@
 """Reservoirs with a free surface."""
 
+from typing import Any
+
 from pydantic import Field
 
 from crescentlab.component import Component, Equations
@@ -44,7 +46,8 @@ class Reservoir(Component):
     supply = supplies("power by the height of the inlets, less work against the pressure above the surface")
 
     def equations(self, h: Expr, q_outlet: Expr, q_inlet: Expr, fluid: Fluid) -> Equations:
-        surface, mass_flow = self.surface_pressure, fluid.rho_0 * total(q_inlet)
+        surface: Any = self.surface_pressure
+        mass_flow = fluid.rho_0 * total(q_inlet)
         p_outlet = surface + fluid.rho_0 * self.gravity * (h - self.outlet_height)
         above = fluid.enthalpy(surface)
         head = gauss_legendre(lambda p: (p_outlet - p) / fluid.density(p), surface, p_outlet)

@@ -18,8 +18,8 @@ from crescentlab.components.mechanics import (
     SignalForceSource,
     Spring,
     SpringBetween,
-    StickSlipMass,
 )
+from crescentlab.components.stick_slip import StickSlipMass
 from pydantic import ValidationError
 from scipy.integrate import solve_ivp
 
@@ -172,6 +172,55 @@ def test_static_friction_below_coulomb_is_refused():
     """A mass would chatter between the two."""
     with pytest.raises(ValidationError, match="must be at least coulomb_friction"):
         StickSlipMass(mass=1.0, coulomb_friction=2.0, static_friction=1.0)
+
+
+SPOOL = StickSlipMassWithStops(**FRICTION, high=4e-3, restitution=0.5)
+
+
+@pytest.mark.parametrize("side", [-1.0, 1.0])
+def test_a_stop_holds_what_friction_does_not(side):
+    """Pressed with 15 N: friction bears 10 N, the stop 5 N; pulled away it lets go beyond 10 N, not before."""
+    there = {"x": 0.0 if side < 0 else 4e-3, "v": 0.0, "direction": 0.0, "at": side}
+    pressed = SPOOL.equations(**there, f_port=15 * side)
+    assert (pressed["der_v"], pressed["friction"], pressed["stop_force"]) == (0.0, -10 * side, -5 * side)
+    away = "breaks_away_up" if side < 0 else "breaks_away_down"
+    towards = "breaks_away_down" if side < 0 else "breaks_away_up"
+    assert not pressed[away].condition
+    assert not pressed[towards].condition
+    assert not SPOOL.equations(**there, f_port=-10 * side)[away].condition
+    pulled = SPOOL.equations(**there, f_port=-10.1 * side)[away]
+    assert pulled.condition
+    assert pulled.then == {"direction": -side, "at": 0.0}
+
+
+@pytest.mark.parametrize(("speed", "rebound"), [(2.0, 1.0), (1.9e-3, 0.0)])
+@pytest.mark.parametrize("side", [-1.0, 1.0])
+def test_a_sliding_mass_strikes_a_stop(side, speed, rebound):
+    """e = 0.5: it slides back with half its speed, or rests if that is less than 1 mm/s."""
+    x = -1e-12 if side < 0 else 4e-3 + 1e-12
+    hit = SPOOL.equations(x=x, v=side * speed, direction=side, at=0.0, f_port=0.0)
+    event = hit["hits_low" if side < 0 else "hits_high"]
+    assert event.condition
+    assert event.then["v"] == -side * rebound
+    assert (event.then["direction"], event.then["at"]) == ((-side, 0.0) if rebound else (0.0, side))
+
+
+@pytest.mark.parametrize(
+    ("x", "v", "then"),
+    [
+        (0.0, 0.0, (0.0, 0.0, 0.0, -1.0)),
+        (0.0, -1.0, (0.0, 0.0, 0.0, -1.0)),
+        (0.0, 1.0, (0.0, 1.0, 1.0, 0.0)),
+        (5e-3, 0.0, (4e-3, 0.0, 0.0, 1.0)),
+        (2e-3, -1.0, (2e-3, -1.0, -1.0, 0.0)),
+        (2e-3, 0.0, (2e-3, 0.0, 0.0, 0.0)),
+    ],
+)
+def test_a_mass_between_stops_starts_where_it_may(x, v, then):
+    """Beyond a stop it starts on it; at one, only away from it."""
+    start = SPOOL.equations(x=x, v=v, direction=2.0, at=0.0, f_port=0.0)["starts"]
+    assert start.condition
+    assert tuple(start.then[name] for name in ("x", "v", "direction", "at")) == then
 
 
 def test_stick_slip_oscillator():

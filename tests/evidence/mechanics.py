@@ -83,29 +83,6 @@ def bouncing() -> list[Number]:
 
 
 @evidence(
-    "stick_slip_mass",
-    source="m x'' = k (V t - x) - F_c from breaking away: J. J. Thomsen, Vibrations and Stability (2003)",
-    tolerance=1e-6,
-    because="relative tolerance of the run, 1e-9; events are found to 1e-9 of the span",
-)
-def stick_slip() -> list[Number]:
-    """1 kg drawn by 400 N/m at 50 mm/s, friction 10 N at rest and 6 N in motion: times of slipping and of sticking."""
-    parts = {
-        "block": {"type": "stick_slip_mass", "mass": "1 kg", "coulomb_friction": "6 N", "static_friction": "10 N"},
-        "spring": {"type": "spring_between", "stiffness": "400 N/m"},
-        "drive": {"type": "motion_source", "velocity": "50 mm/s"},
-    }
-    result = run(parts, {"b": ["block.port", "spring.a"], "d": ["drive.port", "spring.b"]}, "2 s")
-    breaks, stops = fired(result, "block.breaks_away_up"), fired(result, "block.stops")
-    w, a = 20.0, 4.0 / 400.0
-    return [
-        Number("first break-away, F_s/(k V)", 0.5, breaks[0], "ms"),
-        Number("slip, 2 (pi - atan(a w/V))/w", 2 * (math.pi - math.atan(a * w / 0.05)) / w, stops[0] - breaks[0], "ms"),
-        Number("stick, 2 a/V", 2 * a / 0.05, breaks[1] - stops[0], "ms"),
-    ]
-
-
-@evidence(
     "spring",
     "spring_between",
     "damper",
