@@ -7,13 +7,31 @@ import numpy as np
 from pydantic import Field
 
 from crescentlab.component import Component, Equations
-from crescentlab.domain import gives_pressure, observable, state, stores, takes_pressure, undecided_pressure
+from crescentlab.domain import (
+    dissipates,
+    gives_pressure,
+    observable,
+    state,
+    stores,
+    stores_energy,
+    takes_pressure,
+    undecided_pressure,
+)
 from crescentlab.fluid import Fluid
 from crescentlab.maths import Expr, fabs, maximum, pi, stack, total
 from crescentlab.units import Flow, Frequency, Length, Pressure, Ratio
 
 from .flow_laws import pipe_friction_drop
-from .frequency_friction import MOST_TERMS, added_gradient, added_inertia, lagging_rates, terms_of
+from .frequency_friction import (
+    MOST_TERMS,
+    added_gradient,
+    added_inertia,
+    lag_loss,
+    lagging_rates,
+    moving,
+    terms_of,
+)
+from .line_energy import heat, kinetic_energy
 from .line_walls import LineWall
 from .two_ports import line_series, two_port_of
 
@@ -50,6 +68,9 @@ class DistributedLine(LineWall, Component):
     at the ends, 4.9 %) and the second, three times as high, 0.8 %; `highest_frequency` says where it is 1 %. Sharp
     fronts ring; for those use `transmission_line` or `lax_wendroff_line`. Not for unsteady friction of turbulent flow,
     nor flow near the speed of sound (the convective term, v/a, is left out).
+    Energy: e(p) of the fluid, C p^2/2 of the wall and \tfrac12 \rho v^2 of the motion per volume, in the lagging flows
+    what its profile has more than a flat one [J]; lost is friction times volume flow [W], booked together with
+    what the convective term would balance, v/a of the motion's power and of either sign.
     Source: staggered grid as the IRC lumps of Rundo & Corvaglia (2016), section 5;
     Zielke (1968), Kagawa et al. (1983); Wylie & Streeter, Fluid Transients in Systems (1993), section 3-4.
     """
@@ -78,6 +99,8 @@ class DistributedLine(LineWall, Component):
     reynolds_number = observable(Ratio, "largest Reynolds number; above some 2300 the flow is not laminar")
     highest_frequency = observable(Frequency, "frequency up to which waves are no more than 1 % slow")
     content = stores()
+    stored_energy = stores_energy()
+    loss = dissipates()
 
     @classmethod
     def gives(cls, end: str) -> bool:
@@ -125,21 +148,35 @@ class DistributedLine(LineWall, Component):
         lag = terms_of(lags, self.friction_terms, self.flows)
         loss = self.loss_coefficient * lengths / self.length
         friction = pipe_friction_drop(q, lengths, self.diameter, self.roughness, fluid, mean, loss)
+        power = friction * q
         if lag:
             friction = friction + lengths * added_gradient(q, lag, mean, self.diameter, fluid)
+            power = power + lengths * lag_loss(q, lag, mean, self.diameter, fluid)
         inertia = 1 + added_inertia(self.friction_terms)
         swell = fluid.rho_0 / fluid.density(p)
+        rate = swell * inflow / (volumes * self.softness(p, self.diameter, fluid))
+        inner, inner_rate = self._beside(p), self._beside(rate)
+        square = moving(q, lag, self.friction_terms)
+        kinetic = kinetic_energy(fluid.rho_0 * lengths / self._area(), square, inner, fluid)
         at_rest = fluid.density(mean) * fluid.kinematic_viscosity(mean) * self._area()
         middle = total(p) / self.pressures
         return {
-            "der_p_node": swell * inflow / (volumes * self.softness(p, self.diameter, fluid)),
+            "der_p_node": rate,
             "der_q_node": (drop - friction) * self._area() / (fluid.rho_0 * lengths * inertia),
             "der_q_lag": lagging_rates(q, lag, mean, self.diameter, fluid) if lag else lags,
             "q": through[0],
             "reynolds_number": reduce(maximum, fluid.rho_0 * fabs(q) * self.diameter / at_rest),
             "highest_frequency": ONE_PERCENT / pi * self.wave_speed(middle, self.diameter, fluid) / self.cell,
             "content": total(volumes * self.swelling(p, self.diameter) / swell),
+            "stored_energy": total(volumes * self.energy_density(p, self.diameter, fluid)) + total(kinetic),
+            "loss": total(heat(power, q, around[:-1], around[1:], inner, inner_rate, kinetic, fluid)),
         }
+
+    def _beside(self, p: Any) -> Any:
+        """For each flow the mean of the pressures beside it, of those that the line itself holds."""
+        first = [] if self.gives("a") else [p[0]]
+        last = [] if self.gives("b") else [p[-1]]
+        return stack(*first, (p[:-1] + p[1:]) / 2, *last)
 
     def _shares(self, volumes: bool = False) -> np.ndarray:
         """Cells of each pressure's volume, or of each flow's column: half a cell at the ends that have it."""

@@ -53,6 +53,8 @@ class LaxWendroffLine(Component):
     the foot of its characteristic; what the end then has becomes its node's value at the tick, so that neither jumps.
     The entry loss K \rho_0 q|q|/(2 A^2) [Pa] sits at end a. The fluid in the nodes, half cells at the ends, changes by
     what the ends take in, exactly. Valid while (a + |v|) \Delta t/\Delta x, the observable `courant`, is below 1.
+    It keeps no books of energy: of what passes an end between two ticks only the fluid is summed up, and what the
+    scheme takes from steep waves at a tick is no friction.
     Not for friction that depends on frequency, for flow near the speed of sound (the convective term, v/a, is left
     out), or for lines of less than some ten diameters.
     Source: R. D. Richtmyer, NCAR Technical Note 63-2 (1962); Wylie & Streeter, Fluid Transients in Systems (1993),

@@ -53,6 +53,10 @@ class LineWall(BaseModel):
         compliance = self.wall_compliance(diameter)
         return (1 + compliance * p) / fluid.bulk_modulus(p) + compliance
 
+    def energy_density(self, p: Expr, diameter: Any, fluid: Fluid) -> Any:
+        r"""(1 + C p) e(p) + C p^2/2 [J/m^3]: energy of fluid and wall together, over the volume of the bore at rest."""
+        return self.swelling(p, diameter) * fluid.energy_density(p) + self.wall_compliance(diameter) * p * p / 2
+
     def wave_speed(self, p: Expr, diameter: Any, fluid: Fluid) -> Any:
         """a [m/s]."""
         return 1 / sqrt(fluid.density(p) * self.softness(p, diameter, fluid))

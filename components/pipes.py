@@ -1,17 +1,39 @@
 """Short pipes of lumped inertia, resistance and capacity (IRC). Lines with travelling waves are not here."""
 
+from dataclasses import dataclass
 from typing import Any, ClassVar
 
 from pydantic import Field
 
 from crescentlab.component import Component, Equations
-from crescentlab.domain import gives_pressure, state, stores, takes_pressure, undecided_pressure
+from crescentlab.domain import (
+    dissipates,
+    gives_pressure,
+    state,
+    stores,
+    stores_energy,
+    takes_pressure,
+    undecided_pressure,
+)
 from crescentlab.fluid import Fluid
 from crescentlab.maths import Expr, pi
 from crescentlab.units import Flow, Length, Pressure, PressureDifference, Ratio
 
 from .flow_laws import pipe_friction_drop
+from .line_energy import heat, kinetic_energy
 from .two_ports import line_series, line_shunt, two_port_of
+
+
+@dataclass(frozen=True)
+class Column:
+    """A share of the fluid in a pipe, moving as one."""
+
+    acceleration: Any
+    """dq/dt [m^3/s^2]"""
+    kinetic: Any
+    """its energy of motion [J]"""
+    loss: Any
+    """what it turns into heat [W]"""
 
 
 class Pipe(Component):
@@ -24,6 +46,9 @@ class Pipe(Component):
     momentum l d(\rho_0 q)/dt is exact and waves run at sqrt(\beta/\rho); f [-] Darcy factor of Churchill (1977)
     for all regimes; K = `loss_coefficient` [-] on the dynamic head; \rho [kg/m^3], \beta [Pa].
     An end that meets a volume takes its pressure (inertial), an end that meets an orifice gives one (capacitive).
+    Energy: A l e(p) of the compressed fluid and \tfrac12 \rho A l v^2 of its motion [J]; lost is friction times volume
+    flow [W], booked together with what the lump's one density and the convective term left out do not tell, of the
+    order of \Delta p/\beta and v/a of the motion's power and of either sign.
     Not for frequencies near the first mode of the pipe, a/(4 l) with one open end, nor for walls that stretch.
     Source: lumped line of inertia, resistance and capacity, as the IRC ducts of Rundo & Corvaglia (2016), section 5.
     """
@@ -40,6 +65,8 @@ class Pipe(Component):
     p = state(Pressure, "mean pressure", start=0.0, nominal=1e5)
     q = state(Flow, "mean flow from a to b", start=0.0, nominal=1e-3 / 60)
     content = stores()
+    stored_energy = stores_energy()
+    loss = dissipates()
 
     def two_port(self, omega: Any, p_mean: float, q_mean: float, fluid: Fluid) -> Any:
         """Flows into the pipe per end pressures [m^3/(s Pa)] at omega [rad/s], shape (m, 2, 2): the travelling waves.
@@ -58,13 +85,19 @@ class Pipe(Component):
         """dp/dt [Pa/s] of a share of the pipe's volume."""
         return fluid.bulk_modulus(p) / (share * self._volume()) * fluid.rho_0 / fluid.density(p) * inflow
 
-    def _acceleration(self, share: float, p_from: Expr, p_to: Expr, q: Expr, fluid: Fluid) -> Any:
-        """dq/dt [m^3/s^2] of a share of the pipe's length."""
+    def _compressed(self, share: float, p: Expr, fluid: Fluid) -> Any:
+        """Energy [J] of the fluid compressed in a share of the pipe's volume."""
+        return share * self._volume() * fluid.energy_density(p)
+
+    def _column(self, share: float, p_from: Expr, p_to: Expr, q: Expr, p: Expr, rate: Expr, fluid: Fluid) -> Column:
+        """A share of the pipe's length, its energy taken with the density at p [Pa], which rises by `rate` [Pa/s]."""
         length = share * self.length
-        mean, loss = (p_from + p_to) / 2, share * self.loss_coefficient
-        friction = pipe_friction_drop(q, length, self.diameter, self.roughness, fluid, mean, loss)
+        mean, local = (p_from + p_to) / 2, share * self.loss_coefficient
+        friction = pipe_friction_drop(q, length, self.diameter, self.roughness, fluid, mean, local)
         inertance = fluid.rho_0 * length / (pi / 4 * self.diameter * self.diameter)
-        return (p_from - p_to - friction) / inertance
+        kinetic = kinetic_energy(inertance, q * q, p, fluid)
+        loss = heat(friction * q, q, p_from, p_to, p, rate, kinetic, fluid)
+        return Column((p_from - p_to - friction) / inertance, kinetic, loss)
 
 
 class PipeInertialInertial(Pipe):
@@ -87,15 +120,18 @@ class PipeInertialInertial(Pipe):
 
     def equations(self, p_a: Expr, p_b: Expr, p: Expr, q: Expr, surplus: Expr, fluid: Fluid) -> Equations:
         q_1, q_2 = q + surplus / 2, q - surplus / 2
-        rate_1 = self._acceleration(0.5, p_a, p, q_1, fluid)
-        rate_2 = self._acceleration(0.5, p, p_b, q_2, fluid)
+        rate = self._filling(1.0, p, surplus, fluid)
+        one = self._column(0.5, p_a, p, q_1, p, rate, fluid)
+        two = self._column(0.5, p, p_b, q_2, p, rate, fluid)
         return {
             "q_a": q_1,
             "q_b": -q_2,
-            "der_p": self._filling(1.0, p, surplus, fluid),
-            "der_q": (rate_1 + rate_2) / 2,
-            "der_surplus": rate_1 - rate_2,
+            "der_p": rate,
+            "der_q": (one.acceleration + two.acceleration) / 2,
+            "der_surplus": one.acceleration - two.acceleration,
             "content": self._volume() * fluid.density(p) / fluid.rho_0,
+            "stored_energy": self._compressed(1.0, p, fluid) + one.kinetic + two.kinetic,
+            "loss": one.loss + two.loss,
         }
 
 
@@ -121,13 +157,16 @@ class PipeCapacitiveCapacitive(Pipe):
         p_1, p_2 = p + drop / 2, p - drop / 2
         rate_1 = self._filling(0.5, p_1, q_a - q, fluid)
         rate_2 = self._filling(0.5, p_2, q_b + q, fluid)
+        column = self._column(1.0, p_1, p_2, q, p, (rate_1 + rate_2) / 2, fluid)
         return {
             "p_a": p_1,
             "p_b": p_2,
             "der_p": (rate_1 + rate_2) / 2,
             "der_drop": rate_1 - rate_2,
-            "der_q": self._acceleration(1.0, p_1, p_2, q, fluid),
+            "der_q": column.acceleration,
             "content": self._volume() / 2 * (fluid.density(p_1) + fluid.density(p_2)) / fluid.rho_0,
+            "stored_energy": self._compressed(0.5, p_1, fluid) + self._compressed(0.5, p_2, fluid) + column.kinetic,
+            "loss": column.loss,
         }
 
 
@@ -148,12 +187,16 @@ class PipeCapacitiveInertial(Pipe):
     b = takes_pressure("second end")
 
     def equations(self, q_a: Expr, p_b: Expr, p: Expr, q: Expr, fluid: Fluid) -> Equations:
+        rate = self._filling(1.0, p, q_a - q, fluid)
+        column = self._column(1.0, p, p_b, q, p, rate, fluid)
         return {
             "p_a": p,
             "q_b": -q,
-            "der_p": self._filling(1.0, p, q_a - q, fluid),
-            "der_q": self._acceleration(1.0, p, p_b, q, fluid),
+            "der_p": rate,
+            "der_q": column.acceleration,
             "content": self._volume() * fluid.density(p) / fluid.rho_0,
+            "stored_energy": self._compressed(1.0, p, fluid) + column.kinetic,
+            "loss": column.loss,
         }
 
 
@@ -174,10 +217,14 @@ class PipeInertialCapacitive(Pipe):
     b = gives_pressure("second end")
 
     def equations(self, p_a: Expr, q_b: Expr, p: Expr, q: Expr, fluid: Fluid) -> Equations:
+        rate = self._filling(1.0, p, q + q_b, fluid)
+        column = self._column(1.0, p_a, p, q, p, rate, fluid)
         return {
             "q_a": q,
             "p_b": p,
-            "der_q": self._acceleration(1.0, p_a, p, q, fluid),
-            "der_p": self._filling(1.0, p, q + q_b, fluid),
+            "der_q": column.acceleration,
+            "der_p": rate,
             "content": self._volume() * fluid.density(p) / fluid.rho_0,
+            "stored_energy": self._compressed(1.0, p, fluid) + column.kinetic,
+            "loss": column.loss,
         }

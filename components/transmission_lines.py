@@ -92,6 +92,8 @@ class TransmissionLine(LineWall, Component):
     between ticks they are parabolas that keep the mean, so the fluid in the line changes by what its ends take in,
     exactly. Fronts stay sharp to a tick; waves of less than 7 ticks per period may be taken for fronts. An end that
     gives its pressure answers flow at once, p = w + Z q, so between it and an orifice must stand a volume.
+    It keeps no books of energy: of what passes an end between two ticks only the fluid is summed up, and waves of one
+    density and impedance carry p q, not the power of a fluid that can be compressed.
     Not for aerated oil over a wide range of pressures, whose wave speed varies (`lax_wendroff_line`), nor for unsteady
     friction of turbulent flow.
     Source: Wylie & Streeter, Fluid Transients in Systems (1993), chapter 3 and section 3-4; P. Krus, K. Weddfelt,

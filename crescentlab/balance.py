@@ -2,7 +2,7 @@
 
 .. math:: \\varepsilon = \\frac{\\left|\\int \\sum q \\, dt - \\Delta S\\right|}{\\max_i \\int \\sum |q_i| / 2 \\, dt},
           \\qquad \\varepsilon_E = \\frac{\\left|\\int \\left(\\sum P + P_s - P_d\\right) dt - \\Delta E\\right|}
-          {\\max_i \\int \\sum |P_i| / 2 \\, dt}
+          {\\max_i \\left(\\int \\sum |P_i| / 2 \\, dt, \\int P_d \\, dt\\right)}
 
 S [m^3 at 0 bar gauge] is what the component's own law stores (its ``stores()`` observable); E [J] the energy in it
 (``stores_energy()``), P [W] the power that enters at a port (:mod:`crescentlab.energy`), P_s that from outside the
@@ -94,8 +94,9 @@ def balance(system: System, values: Values, trajectory: Trajectory) -> Balance |
     net, size, left, power, lost, supplied = _integrals(
         system, values, trajectory, [inflow, flow, entering + supply - loss, passing, loss, supply]
     )
+    most = np.maximum(power, np.abs(lost))
     energies_of = EnergyBalance(
-        *_errors(list(energies), left, power, energy_change), float(supplied.sum()), _nonzero(energies, lost),
+        *_errors(list(energies), left, most, energy_change), float(supplied.sum()), _nonzero(energies, lost),
         float(energy_change.total.sum()), _nonzero(energies, energy_change.at_events), system.silent(),
     )  # fmt: skip
     return Balance(

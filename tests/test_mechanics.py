@@ -19,7 +19,7 @@ from crescentlab.components.mechanics import (
     Spring,
     SpringBetween,
 )
-from crescentlab.components.stick_slip import StickSlipMass
+from crescentlab.components.stick_slip import StickSlipMass, StickSlipMassWithStops
 from pydantic import ValidationError
 from scipy.integrate import solve_ivp
 

@@ -1,9 +1,10 @@
-"""The lumped pipe's causal forms against laminar pipe flow, lumped eigenfrequencies and the mass balance."""
+"""The lumped pipe's causal forms against laminar flow, lumped eigenfrequencies and the balances of mass and energy."""
 
 import math
 
 import numpy as np
 import pytest
+from building import circuit
 from crescentlab.components.fluids import AeratedOil, SimpleOil
 from crescentlab.components.pipes import (
     Pipe,
@@ -135,3 +136,101 @@ def test_losses_use_the_dynamic_head():
         for k in (0.0, 1.5)
     )
     assert (bare[1] - lossy[1]) * 860 * 0.13 / area == pytest.approx(1.5 * 860 * (q / area) ** 2 / 2, rel=1e-9)
+
+
+# -- energy ----------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("form", FORMS)
+@pytest.mark.parametrize("level", [-0.5 * BAR, 0.0, 5 * BAR])
+def test_what_enters_is_stored_or_lost(form, level):
+    """dE/dt = sum rho_0 q w(p) - loss far from rest too, by central differences of the energy; 1e-5 for those.
+
+    Steps of 1 bar at ends of aerated oil at half the atmosphere's pressure, where its density changes by a percent.
+    """
+    pipe = form(**SIZE, loss_coefficient=0.5, roughness="10 um")
+    x = np.array([level, 2e-4, 3e-5 if form is PipeInertialInertial else 2e3][: len(states(form))])
+    ends = tuple(
+        value if port.role == "takes" else flow
+        for port, value, flow in zip(pipe.ports(), (level + 1e5, level), (2.5e-4, -1.5e-4), strict=True)
+    )
+    rate, found = derivative(pipe, x, ends, PUMP_OIL)
+    h = 1.0 / np.max(np.abs(rate))
+    after, before = (derivative(pipe, x + sign * h * rate, ends, PUMP_OIL)[1]["stored_energy"] for sign in (1, -1))
+    pressures = [
+        found[f"p_{port.name}"] if port.role == "gives" else end for port, end in zip(pipe.ports(), ends, strict=True)
+    ]
+    entering = [
+        PUMP_OIL.rho_0 * q * PUMP_OIL.enthalpy(p) for p, q in zip(pressures, flows(pipe, found, ends), strict=True)
+    ]
+    size = sum(map(abs, entering)) + abs(found["loss"])
+    assert (after - before) / (2 * h) == pytest.approx(sum(entering) - found["loss"], abs=1e-5 * size)
+
+
+LIQUID = {"type": "simple_oil", "density": "860 kg/m^3", "kinematic_viscosity": "35 cSt", "bulk_modulus": "1.4 GPa"}
+WIDE = {"type": "pipe", "length": "2 m", "diameter": "100 m"}
+"""So wide that its walls take nothing: friction is 1e-8 of the motion's energy in 20 ms."""
+FULL = 0.5 * 860 * 2 * math.pi / 4 * 100**2
+"""Its energy of motion at 1 m/s [J]."""
+
+
+def ringing(vessels, level, line=None, viscosity="1e-3 cSt", stop="20 ms"):
+    """A pipe, of 1 m/s if none is given, from `level` between two like vessels, or plugs, left to itself."""
+    end = {"type": "capacity", "start": {"p": level}} | vessels if vessels else {"type": "plug"}
+    start = {"start": {"p": level, "q": f"{math.pi / 4 * 100**2} m^3/s"}}
+    parts = circuit(
+        components={"left": end, "right": end, "line": line or WIDE | start},
+        nets={"a": ["left.port", "line.a"], "b": ["line.b", "right.port"]},
+        fluid=LIQUID | {"kinematic_viscosity": viscosity},
+    )
+    return parts.simulate(solver="rodas", stop=stop, rtol=1e-10)
+
+
+@pytest.mark.parametrize("level", ["100 bar", "300 bar"])
+@pytest.mark.parametrize("vessels", [{}, {"volume": "2000 m^3"}], ids=["capacitive", "inertial"])
+def test_what_rings_without_friction_keeps_its_energy(level, vessels):
+    """At any mean pressure, but for the convective term: (v/a)^2 = 6e-7 of 1/2 m v^2 over a swing, within 5 of that.
+
+    With the inertia of mass flow alone, 1/2 rho_0 l q^2/A, it would be p/beta, 2e-2 at 300 bar.
+    """
+    result = ringing(vessels, level)
+    names = ["line", "left", "right"] if vessels else ["line"]
+    energy = sum(result[f"{name}.stored_energy"] for name in names) / FULL
+    drop = result["line.drop"] if not vessels else result["a.p"] - result["b.p"]
+    assert np.ptp(drop) > 10 * BAR
+    assert np.ptp(energy) < 5 * 860 / 1.4e9
+
+
+def test_friction_takes_all_the_motion():
+    """From 50 mm/s in 10 mm bore between plugs to rest: 1/2 rho A l v^2 = 169 uJ turned into heat.
+
+    To 1e-4: half of (v/a)^2 stays as pressure, e^-14 as motion, and the solver's tolerance is 1e-10.
+    """
+    area, v = math.pi / 4 * 0.01**2, 0.05
+    result = ringing(
+        {}, "0 bar", {"type": "pipe", "length": "2 m", "diameter": "10 mm", "start": {"q": f"{area * v} m^3/s"}},
+        "46 cSt", stop="1 s",
+    )  # fmt: skip
+    energy = result.balance.energy
+    assert energy.dissipated["line"] == pytest.approx(0.5 * 860 * area * 2 * v**2, rel=1e-4)
+    assert energy.dissipated["line"] == pytest.approx(-energy.stored, rel=1e-6)
+
+
+def test_ledger_closes_where_a_valve_shuts():
+    """Reservoir, pipe and a valve that shuts within 1 ms: to 1e-6 of what passes, of fluid and of energy."""
+    parts = circuit(
+        components={
+            "reservoir": {"type": "pressure_source", "pressure": "100 bar"},
+            "line": {"type": "pipe", "length": "0.72 m", "diameter": "12 mm", "start": {"p": "100 bar"}},
+            "shutting": {"type": "ramp", "before": "1", "after": "0", "at": "20 ms", "duration": "1 ms"},
+            "valve": {"type": "variable_orifice", "area": "10 mm^2"},
+            "tank": {"type": "tank"},
+        },
+        nets={"inlet": ["reservoir.port", "line.a"], "outlet": ["line.b", "valve.a"], "back": ["valve.b", "tank.port"],
+              "share": ["shutting.y", "valve.opening"]},
+        fluid=LIQUID,
+    )  # fmt: skip
+    result = parts.simulate(stop="50 ms", solver="rodas", rtol=1e-9)
+    assert result["outlet.p"].max() > 130 * BAR
+    assert max(result.balance.components.values()) < 1e-6
+    assert max(result.balance.energy.components.values()) < 1e-6
