@@ -105,12 +105,23 @@ def _parsed(arguments: list[str]) -> argparse.Namespace:
     if given is not None and given not in COMMANDS:
         raise InputError(f"unknown command {given!r}: {nearest(given, COMMANDS)}")
     parser, chosen = _parser(given)
-    options, extra = parser.parse_known_args(arguments, argparse.Namespace(verbose=False, no_code=False))
+    options, extra = parser.parse_known_args(_with_negatives(arguments), argparse.Namespace(verbose=False, no_code=False))
     if extra:
         raise InputError(_unexpected(extra, chosen or parser, given or ""))
     if options.command is None:
         raise InputError(f"name a command: {', '.join(COMMANDS)}; see crescentlab --help")
     return options
+
+
+def _with_negatives(arguments: list[str]) -> list[str]:
+    """Values such as -5% joined to the option before them: argparse would take them for options of their own."""
+    joined: list[str] = []
+    for text in arguments:
+        if re.match(r"-\.?\d", text) and joined and re.fullmatch(r"--[a-z][a-z-]*", joined[-1]):
+            joined[-1] += f"={text}"
+        else:
+            joined.append(text)
+    return joined
 
 
 def _unexpected(extra: list[str], parser: argparse.ArgumentParser, command: str) -> str:

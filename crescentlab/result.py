@@ -224,7 +224,7 @@ def write_series(
         _WRITERS[path.suffix](part, time, columns, units, attributes)
         os.replace(part, path)
     except OSError as error:
-        raise InputError(f"{path}: cannot be written ({error.strerror or error})") from None
+        raise InputError(f"{path}: cannot be written ({os.strerror(error.errno) if error.errno else error})") from None
     finally:
         part.unlink(missing_ok=True)
 

@@ -676,3 +676,11 @@ def test_a_reader_that_has_seen_enough_is_no_error() -> None:
     assert process.stderr.read() == ""
     process.stderr.close()
     assert process.wait() == 0
+
+
+def test_a_negative_value_is_a_value(capsys: pytest.CaptureFixture[str]) -> None:
+    """-5% after an option is told as what it is, not as a missing argument."""
+    assert main(["doctor", "three_pipes", "--line-error", "-5%"]) == 2
+    assert "--line-error -5%: an error lies between 0 and 200 %" in capsys.readouterr().err
+    assert main(["simulate", "relief_valve", "--set", "supply=-3 L/min", "--stop", "-.5ms", "-o", "none"]) == 2
+    assert "stop: -.5ms must be above 0" in capsys.readouterr().err
