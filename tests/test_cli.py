@@ -20,7 +20,9 @@ import xarray as xr
 
 import crescentlab as cl
 from crescentlab.cli import RUN_KEYS, main
+from crescentlab.commands.components import listed
 from crescentlab.commands.schema import schema
+from crescentlab.component import Component
 from crescentlab.library import installed
 
 FLUID = "{type: simple_oil, density: 860 kg/m^3, kinematic_viscosity: 35 cSt, bulk_modulus: 14000 bar}"
@@ -602,6 +604,11 @@ def test_the_schema_lists_every_type_with_its_parameters() -> None:
     assert types["orifice"]["required"] == ["type", "area"]
     assert types["capacity"]["properties"]["start"]["properties"].keys() == {"p"}
     assert "pipe_inertial_inertial" not in types
+    for name, cls in listed(installed()).items():
+        if name in types:
+            fields = {declared.alias or field for field, declared in cls.model_fields.items()}
+            assert fields | {"type", "start"} == set(types[name]["properties"])
+    assert set(types) == {name for name, cls in listed(installed()).items() if issubclass(cls, Component)}
     fluids = made["$defs"]["FluidSection"]["allOf"]
     assert "kinematic_viscosity" in next(
         b["then"]["properties"] for b in fluids if b["if"]["properties"]["type"]["const"] == "simple_oil"

@@ -2,10 +2,15 @@
 
 from __future__ import annotations
 
+import inspect
+import re
 from collections.abc import Callable
 
 import pytest
+from pydantic import BeforeValidator
 
+from crescentlab.commands.components import described, listed
+from crescentlab.component import Component, field_quantity
 from crescentlab.contract import (
     Backwards,
     Case,
@@ -162,3 +167,39 @@ def test_power_is_accounted_for() -> None:
     """Every type through which power passes says what becomes of it, but for those that cannot."""
     silent = {name for name, form in FORMS.items() if power_ports(form) and not keeps_books(form)}
     assert silent == {name for name in FORMS if name.startswith(SILENT)}
+
+
+TYPES = listed(LIBRARY)
+OF_ANY_SIGN = {
+    "at", "change_factor", "clearance", "damping_length", "delivery_closes", "delivery_opens", "denominator", "end",
+    "flow", "force", "free_length", "gap", "high", "jet_coefficient", "low", "mean_pressure", "numerator", "overlap",
+    "phase", "position", "preload", "pressure", "seat_position", "share", "speed", "start_angle", "start_flow",
+    "start_phase", "start_pressure", "suction_closes", "suction_opens", "surface_pressure", "torque", "velocity",
+    "weights",
+}  # fmt: skip
+"""Positions, angles, gauge pressures, imposed values and starts, which may be anything."""
+
+
+@pytest.mark.parametrize("name", listed(LIBRARY))
+def test_parameters_have_unit_bound_and_meaning(name: str) -> None:
+    """A number has a quantity, which brings its units, and a bound, unless it may be anything; all have a meaning.
+
+    The values of signals are read with the units of the signal's quantity, which is a parameter itself.
+    """
+    for field, declared in TYPES[name].model_fields.items():
+        assert declared.description, f"{field} has no description"
+        quantity = field_quantity(declared)
+        read = [m for m in declared.metadata if isinstance(m, BeforeValidator)]
+        assert quantity is not None or declared.annotation is not float or read, f"{field} has no quantity"
+        if quantity is not None and field not in OF_ANY_SIGN:
+            assert any(hasattr(m, kind) for m in declared.metadata for kind in ("gt", "ge", "lt", "le")), field
+
+
+@pytest.mark.parametrize("name", listed(LIBRARY))
+def test_its_description_is_whole(name: str) -> None:
+    """`crescentlab components TYPE` shows every parameter and port by its name."""
+    cls = TYPES[name]
+    shown = [declared.alias or field for field, declared in cls.model_fields.items()]
+    ports = [p.name for p in cls.ports()] if issubclass(cls, Component) else []
+    words = set(re.findall(r"\w+", described(name, cls).partition(inspect.cleandoc(cls.__doc__ or ""))[2]))
+    assert {*shown, *ports} <= words
