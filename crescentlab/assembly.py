@@ -443,7 +443,7 @@ class _Assembly:
         return found
 
     def energies(self) -> dict[str, ca.SX]:
-        """Per component that keeps books of energy, its five rows."""
+        """Per component through which power passes, its five rows of the ledger."""
         rows = self.every(lambda trace: trace.books)
         layout = self.layout(lambda trace: trace.books.numel_out(0))
         return {name: _part(rows, layout, name) for name, size in layout.slots if size}

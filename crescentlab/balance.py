@@ -48,8 +48,8 @@ class EnergyBalance:
     """Change of what is stored."""
     at_events: dict[str, float]
     """Gained by jumps at events, negative where an impact lost it; part of ``stored``."""
-    silent: list[str]
-    """Components through which power passes and which do not say what becomes of it."""
+    silent: dict[str, float]
+    """What entered components that do not say what becomes of it."""
 
     def as_json(self) -> dict[str, object]:
         """Plain data for ``--json``."""
@@ -94,14 +94,24 @@ def balance(system: System, values: Values, trajectory: Trajectory) -> Balance |
     net, size, left, power, lost, supplied = _integrals(
         system, values, trajectory, [inflow, flow, entering + supply - loss, passing, loss, supply]
     )
-    most = np.maximum(power, np.abs(lost))
-    energies_of = EnergyBalance(
-        *_errors(list(energies), left, most, energy_change), float(supplied.sum()), _nonzero(energies, lost),
-        float(energy_change.total.sum()), _nonzero(energies, energy_change.at_events), system.silent(),
-    )  # fmt: skip
-    return Balance(
-        *_errors(list(contents), net, size, fluid_change), _by_name(contents, fluid_change.moved),
-        energies_of if energies else None,
+    books = _kept(system, list(energies), left, np.maximum(power, np.abs(lost)), lost, supplied, energy_change)
+    errors = _errors(list(contents), net - fluid_change.smooth, size, fluid_change)
+    return Balance(*errors, _by_name(contents, fluid_change.moved), books)
+
+
+def _kept(
+    system: System, names: list[str], left: Array, most: Array, lost: Array, supplied: Array, change: _Change
+) -> EnergyBalance | None:
+    """The ledger of energy; None if no component keeps books."""
+    silent = system.silent()
+    entered = {name: float(each) for name, each in zip(names, left, strict=True) if name in silent}
+    if len(entered) == len(names):
+        return None
+    missing = np.where([name in silent for name in names], 0.0, left - change.smooth)
+    errors, circuit = _errors(names, missing, most, change)
+    return EnergyBalance(
+        {name: error for name, error in errors.items() if name not in silent}, circuit, float(supplied.sum()),
+        _nonzero(names, lost), float(change.total.sum()), _nonzero(names, change.at_events), entered,
     )  # fmt: skip
 
 
@@ -120,6 +130,12 @@ class _Change:
     """Sum of the magnitudes of the jumps."""
     largest: Array
     """Largest amount stored."""
+
+    @property
+    def smooth(self) -> Array:
+        """Change between events."""
+        smooth: Array = self.total - self.at_events
+        return smooth
 
 
 def _changes(system: System, values: Values, trajectory: Trajectory, stored: list[ca.SX]) -> list[_Change]:
@@ -159,10 +175,9 @@ def _prepared(system: System, columns: list[ca.SX]) -> Prepared:
     return prepare("ledger", system.arguments[:-1], system.p, parts)
 
 
-def _errors(names: list[str], into: Array, passing: Array, change: _Change) -> tuple[dict[str, float], float]:
+def _errors(names: list[str], missing: Array, passing: Array, change: _Change) -> tuple[dict[str, float], float]:
     """Errors per component and of the circuit, as shares of the most that passed through any component."""
     unit = max(float(passing.max(initial=0)), AT_REST * float(change.largest.max(initial=0)), 1e-300)
-    missing = into - (change.total - change.at_events)
     return _by_name(names, np.abs(missing) / unit), float(abs(missing.sum()) / unit)
 
 

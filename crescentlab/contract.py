@@ -26,7 +26,7 @@ from pydantic import ValidationError
 from crescentlab import units
 from crescentlab.component import Component, field_quantity
 from crescentlab.domain import HYDRAULIC, ROTATIONAL, SIGNAL, TRANSLATIONAL, Held, Observable, Port, State
-from crescentlab.energy import fluids_asked, fluids_needed, power_ports
+from crescentlab.energy import fluids_asked, fluids_needed, keeps_books, power_ports
 from crescentlab.fluid import Fluid
 from crescentlab.trace import Layout, Trace, numeric_fields, trace
 
@@ -143,7 +143,7 @@ class Case:
     @property
     def keeps_books(self) -> bool:
         """Whether it says what becomes of the power that enters through its ports."""
-        return bool(self.made.books.numel_out(0))
+        return keeps_books(self.cls) and bool(power_ports(self.cls))
 
     @property
     def between_bodies(self) -> bool:

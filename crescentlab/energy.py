@@ -50,7 +50,7 @@ def fluids_asked(cls: type[Component]) -> tuple[str, ...]:
 def fluids_needed(cls: type[Component]) -> tuple[str, ...]:
     """The fluid arguments of a class's equations, and those that only the power through its ports asks for."""
     asked = fluids_asked(cls)
-    more = [_fluid_of(cls, p) for p in power_ports(cls) if p.domain is HYDRAULIC] if keeps_books(cls) else []
+    more = [_fluid_of(cls, p) for p in power_ports(cls) if p.domain is HYDRAULIC]
     return (*asked, *dict.fromkeys(name for name in more if name not in asked))
 
 
@@ -67,12 +67,7 @@ def _fluid_of(cls: type[Component], port: Port) -> str:
 
 
 def powers(cls: type[Component], values: Mapping[str, Any], fluids: Mapping[str, Fluid]) -> ca.SX:
-    """Power [W] into the component at every element of its ports, a column; ``values`` are the ports' variables.
-
-    Empty for a class that does not say what becomes of it.
-    """
-    if not keeps_books(cls):
-        return ca.SX(0, 1)
+    """Power [W] into the component at every element of its ports, a column; ``values`` are the ports' variables."""
     return column([_power(port, values, fluids.get(_fluid_of(cls, port))).sx for port in power_ports(cls)])
 
 
@@ -101,7 +96,7 @@ def deduced(cls: type[Component], entering: ca.SX) -> dict[str, Any]:
 def books(cls: type[Component], values: Mapping[str, Any], entering: ca.SX) -> ca.SX:
     """Energy stored [J], dissipation, supply, power that enters [W] and half the sum of its magnitudes; five rows.
 
-    No rows for a class that does not say what becomes of it, or through which no power passes.
+    No rows for a class through which no power passes.
     """
     if not entering.numel():
         return ca.SX(0, 1)

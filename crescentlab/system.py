@@ -218,7 +218,7 @@ class System:
         return {name: (content(), *flows()) for name, (content, flows) in self._contents.items()}
 
     def energies(self) -> dict[str, ca.SX]:
-        """Per component that keeps books of energy, the five rows of :func:`crescentlab.energy.books`."""
+        """Per component through which power passes, the five rows of :func:`crescentlab.energy.books`."""
         return self._energies()
 
     def silent(self) -> list[str]:

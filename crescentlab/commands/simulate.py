@@ -26,8 +26,8 @@ log = logging.getLogger("crescentlab")
 EXIT_CODES = {"done": DONE, "stopped": DONE, "failed": FAILED, "interrupted": INTERRUPTED}
 MAX_NETS = 12
 """Most net pressures listed in the summary."""
-MAX_SILENT = 4
-"""Most components listed that keep no books of energy."""
+MAX_HOT = 4
+"""Most components listed that turn energy into heat."""
 
 
 def arguments(parser: argparse.ArgumentParser) -> None:
@@ -189,9 +189,13 @@ def _ledgers(balance: Balance) -> Iterator[tuple[str, str]]:
     if lost := sum(energy.at_events.values()):
         said.append(f"of it {_joules(lost)} at events")
     if energy.silent:
-        more = len(energy.silent) - MAX_SILENT
-        said.append(f"without {', '.join(energy.silent[:MAX_SILENT])}" + (f" and {more} more" if more > 0 else ""))
+        into = next(iter(energy.silent)) if len(energy.silent) == 1 else f"{len(energy.silent)} parts without books"
+        said.append(f"{_joules(sum(energy.silent.values()))} into {into}")
     yield "energy", ", ".join(said)
+    hottest = sorted(energy.dissipated.items(), key=lambda item: -abs(item[1]))
+    if len(hottest) > 1:
+        more = f", {len(hottest) - MAX_HOT} more" if len(hottest) > MAX_HOT else ""
+        yield "heat", ", ".join(f"{_joules(amount)} {name}" for name, amount in hottest[:MAX_HOT]) + more
 
 
 def _joules(amount: float) -> str:
