@@ -135,8 +135,11 @@ def integrated_free_air(
     seam = saturation_pressure - rounding * span
     linear = absolute < seam
     x, a, tiny = where(linear, absolute, seam) / start, 1 / polytropic_index, (minimum_pressure / start) ** 2
-    bulk = saturation_pressure * (integrated_power(x, -a) + tiny * integrated_power(x, -a - 2))
-    less = start * (integrated_power(x, 1 - a) + tiny * integrated_power(x, -a - 1))
+    power, height = x ** (-a), log(x)
+    first = height * grown((1 - a) * height)  # the integrals of x^-a, x^(1-a), x^(-a-1) and x^(-a-2) from 1 on
+    second, before_first, last = (power * x * x - 1) / (2 - a), (1 - power) / a, (1 - power / x) / (1 + a)
+    bulk = saturation_pressure * (first + tiny * last)
+    less = start * (second + tiny * before_first)
     stop = where(linear, seam, where(absolute < saturation_pressure, absolute, saturation_pressure))
 
     def air(P: Any) -> Any:
@@ -147,16 +150,14 @@ def integrated_free_air(
 
     share = air_fraction / (1 - air_fraction)
     before = (atmospheric_pressure / start) ** a * start / span * (bulk - less)
-    return share * (before + gauss_legendre(air, seam, stop, nodes=8) / (rounding * rounding))
+    return share * (before + gauss_legendre(air, seam, stop, nodes=5) / (rounding * rounding))
 
 
-def integrated_power(x: Any, exponent: Any) -> Any:
-    r"""Integral of t^a from 1 to x > 0, (x^{a+1} - 1)/(a + 1), and log x at a = `exponent` = -1."""
-    height = log(x)
-    y = (exponent + 1) * height
+def grown(y: Any) -> Any:
+    r"""(e^y - 1)/y, 1 at y = 0. The integral of t^a from 1 to x is log x times that of y = (a + 1) log x."""
     near = y * y < 1e-6
     away = where(near, 1.0, y)
-    return height * where(near, 1 + y / 2 * (1 + y / 3 * (1 + y / 4)), expm1(away) / away)
+    return where(near, 1 + y / 2 * (1 + y / 3 * (1 + y / 4)), expm1(away) / away)
 
 
 def evaporating(liquid: Law, absolute: Law, density_ratio: Any, vapour_pressure: Any, share: Any) -> Law:

@@ -291,11 +291,11 @@ class _Tracing:
         return Trace(
             self.cls, self.states, self.held, self.inputs, self.outputs, self.observables, self.parameters,
             self.fluid_names,
-            tuple(self.groups(y, function)), function("der", derivative), function("obs", observable), tuple(infos),
+            tuple(self.groups(y, function)), function("der", derivative), function("obs", ca.cse(observable)), tuple(infos),
             function("rel", ca.horzcat(column(relations), column(scales))), tuple(events),
             function("cond", column(conditions)),
             function("period", column(periods)), function("clock", clock),
-            function("books", books(self.cls, returned, self.entering)),
+            function("books", ca.cse(books(self.cls, returned, self.entering))),
         )  # fmt: skip
 
     @staticmethod
