@@ -18,9 +18,9 @@ class Capacity(Component):
 
     .. math:: \frac{dp}{dt} = \frac{\beta(p)}{V} \frac{\rho_0}{\rho(p)} \sum q
 
-    p [Pa] gauge; V = `volume` [m^3]; q [m^3/s] into the volume, mass flow over \rho_0; \rho [kg/m^3];
-    \beta [Pa]. Stored: V \rho/\rho_0 [m^3]. Not for volumes that move: use `variable_capacity`.
-    Source: Rundo & Corvaglia (2016), Eq. 2 without its last term.
+    p [Pa] gauge; V = `volume` [m^3]; q [m^3/s] into the volume, mass flow over \rho_0; \rho [kg/m^3]; \beta [Pa].
+    Stored: V \rho/\rho_0 [m^3], energy V e(p) [J]. Not for volumes that move: use `variable_capacity`. Source: Rundo &
+    Corvaglia (2016), Eq. 2 without its last term.
     """
 
     volume: Volume = Field(gt=0, description="fluid volume")
@@ -46,8 +46,9 @@ class VariableCapacity(Component):
     .. math:: \frac{dp}{dt} = \frac{\beta(p)}{V} \left( \frac{\rho_0}{\rho(p)} \sum q - \frac{dV}{dt} \right)
 
     p [Pa] gauge; V [m^3] > 0 and dV/dt [m^3/s] come from the chamber, which is answered by p; q [m^3/s] into the
-    volume, mass flow over \rho_0; \rho [kg/m^3]; \beta [Pa]. Stored: V \rho/\rho_0 [m^3]. Not for volumes that
-    vanish for part of a turn. Source: Rundo & Corvaglia (2016), Eq. 2, with \rho_0/\rho because q is a mass flow.
+    volume, mass flow over \rho_0; \rho [kg/m^3]; \beta [Pa]. Stored: V \rho/\rho_0 [m^3], energy V e(p) [J]. Not for
+    volumes that vanish for part of a turn. Source: Rundo & Corvaglia (2016), Eq. 2, with \rho_0/\rho because q is a
+    mass flow.
     """
 
     port = gives_pressure("the volume")
@@ -74,11 +75,11 @@ class CompliantCapacity(Component):
               \quad V_w = A_w\, h(p), \quad C = A_w \frac{dh}{dp}
 
     p [Pa] gauge; V [m^3] > 0 and dV/dt [m^3/s] come from the chamber, which is answered by p; q [m^3/s] into the
-    volume, mass flow over \rho_0; A_w = `wall_area` [m^2], the mean over the largest deflection already in it;
-    h = `deflection` [m] of p; \rho [kg/m^3]; \beta [Pa]. Stored: (V + V_w) \rho/\rho_0 [m^3], whose rate is
-    exactly \sum q. The chamber's V is that of the rigid walls, so the oil behind the bulging wall, V_w, is
-    compressed as well: without it no closed expression would be stored; V_w/V is about 0.1 % in a pump.
-    Not for walls with inertia or damping. Source: Rundo & Corvaglia (2016), Eq. 2 with section 3, mass balance.
+    volume, mass flow over \rho_0; A_w = `wall_area` [m^2], the mean over the largest deflection already in it; h =
+    `deflection` [m] of p; \rho [kg/m^3]; \beta [Pa]. Stored: energy (V + V_w) e(p) + A_w \int p\,dh [J], and (V + V_w)
+    \rho/\rho_0 [m^3], whose rate is exactly \sum q. The chamber's V is that of the rigid walls, so the oil behind the
+    bulging wall, V_w, is compressed as well: without it no closed expression would be stored; V_w/V is about 0.1 % in a
+    pump. Not for walls with inertia or damping. Source: Rundo & Corvaglia (2016), Eq. 2 with section 3, mass balance.
     """
 
     wall_area: Area = Field(ge=0, description="wall volume per deflection: area times mean over largest deflection")
@@ -115,10 +116,10 @@ class ElasticCapacity(Component):
     `youngs_modulus` [Pa], \nu_w = `poissons_ratio` [-] of the wall; k = 5 - 4 \nu_w for `ends` closed (a vessel, free
     to grow longer), 4 with expansion joints, 4 (1 - \nu_w^2) anchored (no axial strain); q [m^3/s] into the volume,
     mass flow over \rho_0; \rho [kg/m^3]; \beta [Pa]. c is exact for walls of any thickness; for a thin wall it is k
-    d/(4 e E), so that the effective bulk modulus is \beta/(1 + k \beta d/(4 e E)). Stored: V \rho/\rho_0 [m^3]. Not for
-    hoses, whose walls are neither linear nor without loss. Source: G. Lame (1852); S. Timoshenko, Strength of Materials
-    II, thick-walled cylinders; E. B. Wylie, V. L. Streeter, Fluid Transients in Systems (1993), thin
-    walls.
+    d/(4 e E), so that the effective bulk modulus is \beta/(1 + k \beta d/(4 e E)). Stored: V \rho/\rho_0 [m^3], energy
+    V e(p) + V_0 c p^2/2 [J]. Not for hoses, whose walls are neither linear nor without loss. Source: G. Lame (1852); S.
+    Timoshenko, Strength of Materials II, thick-walled cylinders; E. B. Wylie, V. L. Streeter, Fluid Transients in
+    Systems (1993), thin walls.
     """
 
     diameter: Length = Field(gt=0, description="inner diameter")

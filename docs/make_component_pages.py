@@ -69,6 +69,10 @@ def page(name: str, classes: dict[str, type[Component] | type[Fluid]]) -> str:
             parts.append(markdown(("port", "role", "carries", "size", ""), ports))
         if parameters := described.parameter_rows(cls):
             parts.append(markdown(("parameter", "quantity or choice", "default", "range", ""), parameters))
+        if issubclass(cls, Component):
+            for title_, rows in described.variable_rows(cls).items():
+                if rows:
+                    parts.append(markdown((title_.removesuffix("s"), "quantity", "size", ""), rows))
         for case in cases():
             if kind in case.types:
                 parts.append(figures(case))

@@ -62,13 +62,21 @@ def described(name: str, cls: type[Component] | type[Fluid]) -> str:
         parts.append(_section("ports", ("", "role", "domain", "size", ""), [port_row(p) for p in cls.ports()]))
     parts.append(_section("parameters", ("", "quantity or choice", "default", "range", ""), parameter_rows(cls)))
     if issubclass(cls, Component):
-        for title, kind in (("states", State), ("held values", Held), ("observables", Observable)):
-            rows = [(d.name, _quantity(d.quantity), _size(d.size), d.description) for d in _declared(cls, kind)]
+        for title, rows in variable_rows(cls).items():
             parts.append(_section(title, ("", "quantity", "size", ""), rows))
         if cls.family:
             parts.append(f"forms, chosen by what its ends meet: {', '.join(form.type_name() for form in cls.forms())}")
     parts.append(f"defined in {cls.__module__}.{cls.__name__}")
     return "\n\n".join(part for part in parts if part)
+
+
+def variable_rows(cls: type[Component]) -> dict[str, list[tuple[str, str, str, str]]]:
+    """Name, quantity, size and meaning of states, held values and observables."""
+    kinds: dict[str, Any] = {"states": State, "held values": Held, "observables": Observable}
+    return {
+        title: [(d.name, _quantity(d.quantity), _size(d.size), d.description) for d in _declared(cls, kind)]
+        for title, kind in kinds.items()
+    }
 
 
 def _section(title: str, heads: tuple[str, ...], rows: Iterable[tuple[str, ...]]) -> str:
