@@ -291,7 +291,8 @@ class _Tracing:
         return Trace(
             self.cls, self.states, self.held, self.inputs, self.outputs, self.observables, self.parameters,
             self.fluid_names,
-            tuple(self.groups(y, function)), function("der", derivative), function("obs", ca.cse(observable)), tuple(infos),
+            tuple(self.groups(y, function)), function("der", derivative), function("obs", ca.cse(observable)),
+            tuple(infos),
             function("rel", ca.horzcat(column(relations), column(scales))), tuple(events),
             function("cond", column(conditions)),
             function("period", column(periods)), function("clock", clock),
