@@ -105,7 +105,9 @@ def _parsed(arguments: list[str]) -> argparse.Namespace:
     if given is not None and given not in COMMANDS:
         raise InputError(f"unknown command {given!r}: {nearest(given, COMMANDS)}")
     parser, chosen = _parser(given)
-    options, extra = parser.parse_known_args(_with_negatives(arguments), argparse.Namespace(verbose=False, no_code=False))
+    options, extra = parser.parse_known_args(
+        _with_negatives(arguments), argparse.Namespace(verbose=False, no_code=False)
+    )
     if extra:
         raise InputError(_unexpected(extra, chosen or parser, given or ""))
     if options.command is None:

@@ -9,7 +9,6 @@ from __future__ import annotations
 import csv
 import functools
 import math
-import os
 import re
 from collections.abc import Iterable, Sequence
 from pathlib import Path
@@ -19,6 +18,7 @@ import numpy as np
 
 from crescentlab import __version__
 from crescentlab.errors import InputError, nearest
+from crescentlab.files import check_writable, replacing
 from crescentlab.units import DISPLAY, Quantity
 
 if TYPE_CHECKING:
@@ -202,31 +202,24 @@ def matching(globs: Sequence[str], names: Sequence[str], subject: str) -> list[s
     return list(chosen)
 
 
-def check_target(path: Path) -> None:
-    """Refuse an output file that cannot be written, before the run."""
-    if path.suffix not in SUFFIXES:
-        raise InputError(
-            f"-o {path}: the suffix {path.suffix!r} is none of {', '.join(SUFFIXES)}; "
-            f"write for example -o {path.stem or 'result'}.nc"
-        )
-    if not path.parent.is_dir():
-        raise InputError(f"-o {path}: the folder {path.parent} does not exist; make it first")
-    if path.is_dir() or not os.access(path if path.exists() else path.parent, os.W_OK):
-        raise InputError(f"-o {path}: it cannot be written; choose another place")
+def result_target(output: str | None, name: str) -> Path | None:
+    """The file that ``-o`` names, by default ``name``.nc, checked before the run; None for ``-o none``."""
+    if output == "none":
+        return None
+    path = Path(output or f"{name}.nc")
+    check_writable(
+        path, SUFFIXES,
+        f"the suffix {path.suffix!r} is none of {', '.join(SUFFIXES)}; write for example -o {path.stem or 'result'}.nc",
+    )  # fmt: skip
+    return path
 
 
 def write_series(
     path: Path, time: np.ndarray, columns: dict[str, np.ndarray], units: dict[str, str], attributes: dict[str, Any]
 ) -> None:
     """Write series to a file; the suffix chooses the format. An old file is replaced when the new one is complete."""
-    part = path.with_name(f".{path.stem}-{os.getpid()}{path.suffix}")
-    try:
+    with replacing(path) as part:
         _WRITERS[path.suffix](part, time, columns, units, attributes)
-        os.replace(part, path)
-    except OSError as error:
-        raise InputError(f"{path}: cannot be written ({os.strerror(error.errno) if error.errno else error})") from None
-    finally:
-        part.unlink(missing_ok=True)
 
 
 def _write_csv(

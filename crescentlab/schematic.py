@@ -12,6 +12,7 @@ import networkx as nx
 from crescentlab.domain import State
 from crescentlab.elaborate import DesignNet, PortRef
 from crescentlab.errors import InputError
+from crescentlab.files import check_writable
 from crescentlab.graph import Graph
 from crescentlab.placement import place
 
@@ -51,12 +52,8 @@ class Sheet:
 
 def check_target(path: Path) -> None:
     """Refuse a picture that cannot be written."""
-    if path.suffix not in SUFFIXES:
-        raise InputError(
-            f"-o {path}: a schematic is {', '.join(SUFFIXES)}; write for example -o {path.stem or 'circuit'}.svg"
-        )
-    if not path.parent.is_dir():
-        raise InputError(f"-o {path}: the folder {path.parent} does not exist; make it first")
+    said = f"a schematic is {', '.join(SUFFIXES)}; write for example -o {path.stem or 'circuit'}.svg"
+    check_writable(path, SUFFIXES, said)
 
 
 def draw(graph: Graph, path: Path) -> None:

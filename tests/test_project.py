@@ -18,7 +18,7 @@ import pytest
 ROOT = Path(__file__).resolve().parents[1]
 
 LAYERS: tuple[tuple[str, ...], ...] = (
-    ("errors", "symbols", "units", "maths", "compiler", "c_text", "prepared"),
+    ("errors", "files", "symbols", "units", "maths", "compiler", "c_text", "prepared"),
     ("tables", "fluid", "domain", "component", "energy"),
     ("expressions", "yaml_text", "explain", "library", "netlist"),
     ("elaborate",),

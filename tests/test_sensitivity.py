@@ -15,6 +15,7 @@ from scipy.linalg import expm
 
 import crescentlab as cl
 from crescentlab.analysis.outcome import Outcome
+from crescentlab.analysis.reach import STENCILS, slope
 from crescentlab.analysis.sensitivity import Sensitivities, collocation, sensitivities
 from crescentlab.analysis.sensitivity.differences import Runs
 from crescentlab.analysis.sensitivity.variational import monodromy
@@ -454,6 +455,37 @@ class Creeping(Component):
 
     def equations(self, x):
         return {"der_x": 1.0, "der_y": where(x > self.level, 1.0, 0.0)}
+
+
+@pytest.mark.parametrize("side", STENCILS)
+def test_how_an_expression_changes_and_where_it_bends(side):
+    """Five places, 1e-4 apart: exact for 1 + x^4 and x^2; a kink is seen at all places but the end of a side.
+
+    A square at its vertex bends and has no slope, which is smooth; an infinite number that stays is none of ours.
+    """
+    first, weights = STENCILS[side]
+    x = 1e-4 * np.arange(first, first + 5)
+    found = slope(np.array([1 + (2 + x) ** 4, x**2, 0 * x + 3, np.full(5, np.inf)]).T, weights, 1e-4)
+    assert found is not None
+    np.testing.assert_allclose(found, [32, 0, 0, 0], rtol=1e-9, atol=1e-12)
+    for at in np.linspace(x[0], x[-1], 33)[1:-1]:
+        assert slope(np.maximum(x - at, 0)[:, None] + x[:, None], weights, 1e-4) is None
+
+
+def test_a_parameter_at_a_kink_of_its_expression_has_no_exact_derivative():
+    """flow = min(supply, 30 L/min) at 30 L/min: slope 1 on one side and 0 on the other, and not their mean."""
+    run = circuit(
+        components={
+            "pump": {"type": "flow_source", "flow": "= min(supply, 30 L/min)"},
+            "line": {"type": "capacity", "volume": "70 cm^3", "start": {"p": "5 bar"}},
+            "hole": {"type": "orifice", "area": "10 mm^2"}, "tank": {"type": "tank"},
+        },
+        nets={"p": ["pump.port", "line.port", "hole.a"], "t": ["hole.b", "tank.port"]},
+        fluid=OIL, parameters={"supply": "30 L/min"}, simulation={"stop": "1 ms"},
+    )  # fmt: skip
+    found = of(run, ["final(line.p)"], ["supply"])
+    assert found.method[0] != "exact"
+    assert "an expression of supply has a kink or jump" in found.reason[0]
 
 
 def test_a_jump_that_is_no_event_is_noticed():

@@ -42,6 +42,11 @@ def start(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--start", metavar="FILE", help="go on from the end of this result")
 
 
+def result_file(parser: argparse.ArgumentParser) -> None:
+    """``-o`` of a command that writes a result."""
+    parser.add_argument("-o", "--output", metavar="FILE", help=".nc, .csv or .parquet; none writes nothing")
+
+
 def number(text: str) -> float:
     """A plain number, as a type of argparse."""
     try:

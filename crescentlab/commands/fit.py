@@ -4,16 +4,14 @@ from __future__ import annotations
 
 import argparse
 import json
-import os
 from pathlib import Path
-from typing import Any
 
 from crescentlab.cli import DONE
 from crescentlab.commands import arguments as shared
 from crescentlab.commands.fit_text import summary
 from crescentlab.commands.simulate import finite, progress_bar
 from crescentlab.commands.text import settings
-from crescentlab.errors import InputError
+from crescentlab.files import check_writable, write_text
 from crescentlab.studies.fit_pictures import write_pictures
 from crescentlab.studies.fit_problem import read_problem
 from crescentlab.studies.fit_report import report, run_fit
@@ -44,7 +42,7 @@ def run(options: argparse.Namespace) -> int:
     base = target.with_suffix("") if target else Path(problem.name)
     pictures = write_pictures(found, base) if options.plot else []
     if target is not None:
-        _write(target, made)
+        write_text(target, json.dumps(made, indent=2) + "\n")
     if options.json:
         print(json.dumps({**made, "file": str(target) if target else None}, indent=2))
     elif not options.quiet:
@@ -70,17 +68,5 @@ def _target(output: str | None) -> Path | None:
     if output is None or output == "none":
         return None
     path = Path(output)
-    if path.suffix != ".json":
-        raise InputError(f"-o {path}: the suffix must be .json; write for example -o {path.stem or 'fit'}.json")
-    if not path.parent.is_dir():
-        raise InputError(f"-o {path}: the folder {path.parent} does not exist; make it first")
-    if path.is_dir() or not os.access(path if path.exists() else path.parent, os.W_OK):
-        raise InputError(f"-o {path}: it cannot be written; choose another place")
+    check_writable(path, (".json",), f"the suffix must be .json; write for example -o {path.stem or 'fit'}.json")
     return path
-
-
-def _write(path: Path, made: dict[str, Any]) -> None:
-    try:
-        path.write_text(json.dumps(made, indent=2) + "\n", encoding="utf-8")
-    except OSError as error:
-        raise InputError(f"{path}: cannot be written ({error.strerror or error})") from None

@@ -16,7 +16,7 @@ from crescentlab.cli import DONE, FAILED
 from crescentlab.commands import arguments as shared
 from crescentlab.commands.simulate import figures, finite, progress_bar
 from crescentlab.commands.text import counted, settings, table
-from crescentlab.result import check_record, check_target
+from crescentlab.result import check_record, result_target
 from crescentlab.units import QUANTITIES
 
 
@@ -31,7 +31,7 @@ def arguments(parser: argparse.ArgumentParser) -> None:
     shared.start(parser)
     shared.solver(parser)
     parser.set_defaults(solver="rodas")
-    parser.add_argument("-o", "--output", metavar="FILE", help=".nc, .csv or .parquet; none writes nothing")
+    shared.result_file(parser)
     parser.add_argument("--record", action="append", default=[], metavar="GLOB", help="variables to write")
     parser.add_argument("--plot", action="store_true", help="write the circuit's plots of the last period as PNG files")
     shared.json(parser)
@@ -42,9 +42,7 @@ def run(options: argparse.Namespace) -> int:
     """Run the command."""
     values = settings(options.set)
     circuit = load(options.circuit, no_code=options.no_code)
-    target = None if options.output == "none" else Path(options.output or f"{circuit.netlist.name}_periodic.nc")
-    if target is not None:
-        check_target(target)
+    target = result_target(options.output, f"{circuit.netlist.name}_periodic")
     check_record(circuit.system(values), options.record)
     with progress_bar(options.quiet) as progress:
         found = periodic(

@@ -13,7 +13,7 @@ from crescentlab.cli import DONE, FAILED
 from crescentlab.commands import arguments as shared
 from crescentlab.commands.text import table
 from crescentlab.errors import InputError
-from crescentlab.result import check_target
+from crescentlab.result import result_target
 from crescentlab.studies import conduct, tables
 from crescentlab.studies.planning import Planned, plan_study
 from crescentlab.studies.points import DONE as GOOD
@@ -31,7 +31,7 @@ def arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the command's arguments."""
     parser.add_argument("study", metavar="STUDY", help="a study file")
     parser.add_argument("row", metavar="ROW", help="number of the point, or the beginning of its key")
-    parser.add_argument("-o", "--output", metavar="FILE", help=".nc, .csv or .parquet; none writes nothing")
+    shared.result_file(parser)
     parser.add_argument("--rows", metavar="FOLDER", help="where the study's rows are kept; default STUDY.results")
     shared.quiet(parser)
     shared.json(parser)
@@ -43,9 +43,7 @@ def run(options: argparse.Namespace) -> int:
     planned = plan_study(study, no_code=options.no_code)
     store = Store(conduct.results_folder(study.path, options.rows))
     number, stored = _row(planned, store, options.row)
-    target = None if options.output == "none" else Path(options.output or f"{study.name}-{number}.nc")
-    if target is not None:
-        check_target(target)
+    target = result_target(options.output, f"{study.name}-{number}")
     job = replace(
         planned.job(planned.points[number - 1]),
         settings=json.loads(stored["settings"]), write=str(target.resolve()) if target is not None else None,

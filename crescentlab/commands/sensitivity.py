@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import argparse
-import csv
-import io
 import json
 import math
 from pathlib import Path
@@ -17,6 +15,7 @@ from crescentlab.cli import DONE
 from crescentlab.commands import arguments as shared
 from crescentlab.commands.text import settings, table, wrapped
 from crescentlab.errors import InputError, UnitError
+from crescentlab.files import check_writable, write_rows, write_text
 from crescentlab.units import QUANTITIES, Quantity
 
 KEYS = (
@@ -53,8 +52,10 @@ def run(options: argparse.Namespace) -> int:
     )  # fmt: skip
     every = rows(found)
     written = {"status": "done", "circuit": options.circuit, "sensitivities": every, "warnings": _warnings(found)}
-    if target is not None:
-        target.write_text(_csv(every) if target.suffix == ".csv" else json.dumps(written, indent=2) + "\n", "utf-8")
+    if target is not None and target.suffix == ".csv":
+        write_rows(target, [KEYS, *([row[key] for key in KEYS] for row in every)])
+    elif target is not None:
+        write_text(target, json.dumps(written, indent=2) + "\n")
     if options.json:
         print(json.dumps({**written, "file": str(target) if target else None, "error": None}, indent=2))
     else:
@@ -67,10 +68,7 @@ def _target(output: str | None) -> Path | None:
     if output is None:
         return None
     target = Path(output)
-    if target.suffix not in (".csv", ".json"):
-        raise InputError(f"-o {output}: the suffix {target.suffix!r} is neither .csv nor .json")
-    if not target.parent.is_dir() or target.is_dir():
-        raise InputError(f"-o {output}: it cannot be written; choose a file in a folder that exists")
+    check_writable(target, (".csv", ".json"), f"the suffix {target.suffix!r} is neither .csv nor .json")
     return target
 
 
@@ -109,14 +107,6 @@ def _known(value: float) -> float | None:
 def _per(unit: str, by: str) -> str:
     """The unit of a derivative: ``bar per mm2``."""
     return unit if by in ("", "1") else f"{unit or '1'} per {by}"
-
-
-def _csv(every: list[dict[str, Any]]) -> str:
-    text = io.StringIO(newline="")
-    writer = csv.DictWriter(text, KEYS)
-    writer.writeheader()
-    writer.writerows(every)
-    return text.getvalue()
 
 
 def summary(found: Sensitivities, target: Path | None) -> str:

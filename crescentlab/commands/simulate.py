@@ -18,7 +18,7 @@ from crescentlab.circuit import Circuit, load
 from crescentlab.cli import DONE, FAILED, INTERRUPTED
 from crescentlab.commands import arguments as shared
 from crescentlab.commands.text import counted, settings, table
-from crescentlab.result import Result, check_record, check_target
+from crescentlab.result import Result, check_record, result_target
 from crescentlab.units import QUANTITIES
 
 log = logging.getLogger("crescentlab")
@@ -37,7 +37,7 @@ def arguments(parser: argparse.ArgumentParser) -> None:
     shared.start(parser)
     shared.solver(parser)
     parser.add_argument("--output-step", metavar="DT", help="uniform output grid, for example '0.1 ms'")
-    parser.add_argument("-o", "--output", metavar="FILE", help=".nc, .csv or .parquet; none writes nothing")
+    shared.result_file(parser)
     parser.add_argument(
         "--record", action="append", default=[], metavar="GLOB", help="variables to write; only * and ? are wild"
     )
@@ -50,7 +50,7 @@ def run(options: argparse.Namespace) -> int:
     """Run the command."""
     values = settings(options.set)
     circuit = load(options.circuit, no_code=options.no_code)
-    target = _target(options.output, circuit)
+    target = result_target(options.output, circuit.netlist.name)
     _check_before(circuit, values, options)
     with progress_bar(options.quiet) as progress:
         result = circuit.simulate(
@@ -72,15 +72,6 @@ def run(options: argparse.Namespace) -> int:
     if EXIT_CODES[status] != DONE:
         print(result.trajectory.error, file=sys.stderr)
     return EXIT_CODES[status]
-
-
-def _target(output: str | None, circuit: Circuit) -> Path | None:
-    """The file to write, checked before the run; None for ``-o none``."""
-    if output == "none":
-        return None
-    target = Path(output or f"{circuit.netlist.name}.nc")
-    check_target(target)
-    return target
 
 
 def _check_before(circuit: Circuit, values: dict[str, str], options: argparse.Namespace) -> None:

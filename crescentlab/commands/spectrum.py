@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-import csv
 import json
 import math
 from collections.abc import Iterable, Sequence
@@ -30,6 +29,7 @@ from crescentlab.commands.spectrum_text import (
 )
 from crescentlab.commands.text import settings
 from crescentlab.errors import InputError, SimulationError, UnitError, nearest
+from crescentlab.files import check_writable, write_rows, write_text
 from crescentlab.result import SUFFIXES, Result, column_names, matching, read_series
 from crescentlab.units import DISPLAY, QUANTITIES, Quantity, is_number
 
@@ -78,10 +78,8 @@ def _check(options: argparse.Namespace) -> None:
     """Find before the run what is wrong in the options."""
     if options.period and options.frequency:
         raise InputError("--period and --frequency say the same; write one of them")
-    if options.output and Path(options.output).suffix not in (".csv", ".json"):
-        raise InputError(f"-o {options.output}: lines are written as .csv or .json")
-    if options.output and not Path(options.output).parent.is_dir():
-        raise InputError(f"-o {options.output}: the folder {Path(options.output).parent} does not exist; make it first")
+    if options.output:
+        check_writable(Path(options.output), (".csv", ".json"), "lines are written as .csv or .json")
     if options.periodic and (options.stop or options.begin or options.periods not in (None, 1)):
         raise InputError("--periodic gives exactly one period; leave --stop, --from and --periods out")
     if options.waterfall and (options.periodic or options.period or options.frequency or options.periods):
@@ -284,14 +282,10 @@ def _print(facts: dict[str, Any], text: str, written: list[Path], options: argpa
 
 
 def _write(path: Path, facts: dict[str, Any], rows: Iterable[Sequence[Any]]) -> None:
-    try:
-        with path.open("w", newline="", encoding="utf-8") as file:
-            if path.suffix == ".json":
-                file.write(json.dumps(facts, indent=2) + "\n")
-            else:
-                csv.writer(file).writerows([repr(v) if isinstance(v, float) else v for v in row] for row in rows)
-    except OSError as error:
-        raise InputError(f"-o {path}: cannot be written ({error.strerror or error})") from None
+    if path.suffix == ".json":
+        write_text(path, json.dumps(facts, indent=2) + "\n")
+    else:
+        write_rows(path, rows)
 
 
 # -- waterfalls ----------------------------------------------------------------------------------

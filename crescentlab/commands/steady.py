@@ -15,7 +15,7 @@ from crescentlab.commands import arguments as shared
 from crescentlab.commands.simulate import MAX_NETS, finite, progress_bar
 from crescentlab.commands.text import counted, settings, table
 from crescentlab.errors import SimulationError
-from crescentlab.result import check_target
+from crescentlab.result import result_target
 from crescentlab.units import QUANTITIES
 
 KEYS = (
@@ -35,7 +35,7 @@ def arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--tolerance", metavar="R", type=shared.number, default=1e-9, help="relative error of every unknown (1e-9)"
     )
-    parser.add_argument("-o", "--output", metavar="FILE", help=".nc, .csv or .parquet; none writes nothing")
+    shared.result_file(parser)
     shared.json(parser)
     shared.quiet(parser)
 
@@ -44,9 +44,7 @@ def run(options: argparse.Namespace) -> int:
     """Run the command."""
     values = settings(options.set)
     circuit = load(options.circuit, no_code=options.no_code)
-    target = None if options.output == "none" else Path(options.output or f"{circuit.netlist.name}_steady.nc")
-    if target is not None:
-        check_target(target)
+    target = result_target(options.output, f"{circuit.netlist.name}_steady")
     try:
         with progress_bar(options.quiet) as progress:
             point = steady(

@@ -20,7 +20,7 @@ from crescentlab.yaml_text import Node, read
 
 KERNEL = "crescentlab"
 COMPONENTS = "crescentlab.components"
-COMPUTING = ("*.py", "c/*", "solvers/*.py", "solvers/c/*", "analysis/*.py")
+COMPUTING = ("*.py", "c/*", "solvers/*.py", "solvers/c/*", "analysis/**/*.py")
 """Sources of the kernel that compute rows."""
 USER = "crescentlab_user_"
 """Begins the names of modules made of a circuit's own files, which are hashed with the circuit."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 import casadi as ca
 import numpy as np
 
-from crescentlab.analysis.linear.derivatives import Derivatives, Local, Point
+from crescentlab.analysis.derivatives import Derivatives, Local, Point
 
 Array = np.ndarray
 

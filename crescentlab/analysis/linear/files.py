@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-import csv
 import json
 import math
-import os
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -14,7 +12,7 @@ import numpy as np
 
 from crescentlab.analysis.linear.frequency import Responses, Transfer
 from crescentlab.analysis.linear.modes import Mode
-from crescentlab.errors import InputError
+from crescentlab.files import check_writable, write_rows, write_text
 
 Array = np.ndarray
 
@@ -25,12 +23,8 @@ SUFFIXES = (".csv", ".json")
 
 def check_linear_target(path: Path) -> None:
     """Refuse an output file that cannot be written, before the work."""
-    if path.suffix not in SUFFIXES:
-        raise InputError(f"-o {path}: the suffix {path.suffix!r} is none of .csv, .json; write {path.stem or 'x'}.csv")
-    if not path.parent.is_dir():
-        raise InputError(f"-o {path}: the folder {path.parent} does not exist; make it first")
-    if path.is_dir() or not os.access(path if path.exists() else path.parent, os.W_OK):
-        raise InputError(f"-o {path}: it cannot be written; choose another place")
+    said = f"the suffix {path.suffix!r} is none of .csv, .json; write {path.stem or 'x'}.csv"
+    check_writable(path, SUFFIXES, said)
 
 
 def gain_unit(transfer: Transfer) -> str:
@@ -98,7 +92,7 @@ def write(found: Responses, made: dict[str, Any], path: Path, unit: str) -> list
     ``FILE-A.csv`` to ``FILE-D.csv``.
     """
     if path.suffix == ".json":
-        _replace(path, json.dumps(made, indent=1, allow_nan=False))
+        write_text(path, json.dumps(made, indent=1, allow_nan=False) + "\n")
         return [path]
     m = found.model
     states, inputs = list(m.states), [u.name for u in m.inputs]
@@ -116,7 +110,7 @@ def write(found: Responses, made: dict[str, Any], path: Path, unit: str) -> list
     written: list[Path] = []
     for name, rows in tables:
         written.append(path.with_name(f"{path.stem}-{name}.csv") if name else path)
-        _write_rows(written[-1], rows)
+        write_rows(written[-1], rows)
     return written
 
 
@@ -153,26 +147,3 @@ def _finite(value: float) -> float | None:
 
 def _matrix(values: Array, rows: Sequence[str], columns: Sequence[str]) -> list[list[Any]]:
     return [["", *columns], *[[name, *row] for name, row in zip(rows, values.tolist(), strict=True)]]
-
-
-def _write_rows(path: Path, rows: Iterable[Sequence[Any]]) -> None:
-    part = path.with_name(f".{path.name}-{os.getpid()}")
-    try:
-        with part.open("w", newline="", encoding="utf-8") as file:
-            csv.writer(file).writerows([repr(v) if isinstance(v, float) else v for v in row] for row in rows)
-        os.replace(part, path)
-    except OSError as error:
-        raise InputError(f"{path}: cannot be written ({error.strerror or error})") from None
-    finally:
-        part.unlink(missing_ok=True)
-
-
-def _replace(path: Path, text: str) -> None:
-    part = path.with_name(f".{path.name}-{os.getpid()}")
-    try:
-        part.write_text(text + "\n", encoding="utf-8")
-        os.replace(part, path)
-    except OSError as error:
-        raise InputError(f"{path}: cannot be written ({error.strerror or error})") from None
-    finally:
-        part.unlink(missing_ok=True)

@@ -7,15 +7,16 @@ assembled: it takes what the net gives, so it changes neither the causality nor 
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 
 from crescentlab import units
+from crescentlab.analysis.reach import NotDifferentiableError, Parameter, Reaching, quantity_of
 from crescentlab.circuit import Circuit
-from crescentlab.component import Component, Equations, field_quantity
+from crescentlab.component import Component, Equations
 from crescentlab.domain import HYDRAULIC, ROTATIONAL, TRANSLATIONAL, takes_motion, takes_pressure, takes_rotation
 from crescentlab.elaborate import Design, DesignNet, Instance, PortRef
 from crescentlab.errors import InputError, nearest
@@ -26,10 +27,9 @@ from crescentlab.units import Flow, Force, Quantity, Torque
 
 Array = np.ndarray
 
-STEP = 1e-3
-"""Relative step of the differences by which a circuit parameter's way into the components' parameters is found."""
-KINK = 0.02
-"""Relative change of the slope over such a step that a smooth expression does not show."""
+SHAPES = "shapes the equations and has no derivative"
+ROUNDING = 1e-11
+"""A number that changes by this part of itself as a circuit parameter changes by its size is only rounded anew."""
 
 
 class _Probe(Component):
@@ -223,39 +223,37 @@ class Inputs:
             part = self.design.instances[owner].component
         fields = {info.alias or n: n for n, info in type(part).model_fields.items()} if part is not None else {}
         if field in fields:
-            absent = getattr(part, fields[field]) is None
-            why = "is not given" if absent else "shapes the equations and has no derivative"
-            raise InputError(f"input {name}: this parameter {why}; name a number that acts inside the equations")
+            raise _refused(name, "is not given" if getattr(part, fields[field]) is None else SHAPES)
 
     def _through_the_design(self, name: str, system: System) -> Input:
-        """A circuit parameter: how the components' parameters change with it, by fourth-order differences.
-
-        p follows from it by the expressions of the circuit file alone, so the differences see no noise of an
-        integration; they are exact to rounding for polynomials up to the fourth degree.
-        """
+        """A circuit parameter: how the components' parameters change with it."""
         scope, _, own = name.rpartition(".")
         value = self.design.parameters[f"{scope}." if scope else ""][own]
         if isinstance(value.value, str):
             raise InputError(f"input {name}: it is the word {value.value!r}; an input is a number")
-        here, unit = float(value.value), value.quantity.si if value.quantity.si != "1" else ""
-        step = STEP * (abs(here) or value.quantity.nominal)
-
-        def moved(k: int) -> Array:
-            settings = {**self.settings, name: f"{here + k * step!r} {unit}".strip()}
-            design = self.circuit.design(settings)
-            probes = {n: i for n, i in self.design.instances.items() if n not in design.instances}
-            return system.values(replace(design, instances={**design.instances, **probes})).p
-
-        near, far = moved(1) - moved(-1), moved(2) - moved(-2)
-        slope = (8 * near - far) / (12 * step)
-        size = np.abs(moved(0)) / step
-        bends = np.abs(moved(1) + moved(-1) - 2 * moved(0)) / step, np.abs(far / (4 * step) - slope)
-        if np.any(np.maximum(*bends) > KINK * np.abs(slope) + 1e-12 * size):
-            raise InputError(f"input {name}: at this value an expression of it has a kink or jumps; move it a little")
-        places = np.flatnonzero(np.abs(slope) > 1e-12 * size)
+        parameter = Parameter(name, float(value.value), value.quantity, "input")
+        reaching = Reaching(self._with_probes, system, self.design, self.settings)
+        if reaching.shapes(parameter):
+            raise _refused(name, SHAPES)
+        try:
+            slope = reaching.reach(parameter).p
+        except NotDifferentiableError:
+            said = f"input {name}: at this value an expression of it has a kink or jumps; move it a little"
+            raise InputError(said) from None
+        places = np.flatnonzero(np.abs(slope) * parameter.size > ROUNDING * np.abs(system.values(self.design).p))
         if not places.size:
             raise InputError(f"input {name}: no number inside the equations depends on it; it changes nothing here")
         return Input(name, value.quantity, "", tuple((int(k), float(slope[k])) for k in places))
+
+    def _with_probes(self, settings: dict[str, str]) -> Design:
+        """The design of other settings with the same probes."""
+        design = self.circuit.design(settings)
+        probes = {n: i for n, i in self.design.instances.items() if isinstance(i.component, _Probe)}
+        return replace(design, instances={**design.instances, **probes})
+
+
+def _refused(name: str, why: str) -> InputError:
+    return InputError(f"input {name}: this parameter {why}; name a number that acts inside the equations")
 
 
 def parameter_places(system: System, design: Design) -> dict[str, tuple[int, Quantity]]:
@@ -263,26 +261,15 @@ def parameter_places(system: System, design: Design) -> dict[str, tuple[int, Qua
     found: dict[str, tuple[int, Quantity]] = {}
     at = 0
 
-    def add(owner: str, model: Any, names: Sequence[str], quantity: Callable[[str], Quantity | None]) -> None:
+    def add(owner: str, model: Any, names: Sequence[str]) -> None:
         nonlocal at
         for name in names:
             alias = type(model).model_fields[name].alias or name
-            found[f"{owner}.{alias}"] = (at, quantity(name) or units.ratio)
+            found[f"{owner}.{alias}"] = (at, quantity_of(model, name) or units.ratio)
             at += 1
 
     for owner, fluid in design.fluids.items():
-        fields = type(fluid).model_fields
-        add(owner, fluid, numeric_fields(type(fluid), fluid), lambda n, fields=fields: field_quantity(fields[n]))  # type: ignore[misc]
+        add(owner, fluid, numeric_fields(type(fluid), fluid))
     for owner, trace in system.plan.traces.items():
-        part = design.instances[owner].component
-        add(owner, part, trace.parameters, lambda n, part=part: _quantity(part, n))  # type: ignore[misc]
+        add(owner, design.instances[owner].component, trace.parameters)
     return found
-
-
-def _quantity(part: Component, name: str) -> Quantity | None:
-    """The quantity of a component's parameter, also where another field names it."""
-    known = field_quantity(type(part).model_fields[name])
-    if known is None:
-        named = [f for f in ("output_quantity", "input_quantity") if f in type(part).model_fields]
-        known = part.quantity(named[0]) if named else None
-    return known

@@ -23,12 +23,12 @@ import numpy as np
 from scipy.sparse import csc_array, eye_array
 from scipy.sparse.linalg import splu
 
+from crescentlab.analysis.derivatives import Derivatives, Output, Point, output_named
 from crescentlab.analysis.linear.boundaries import one_sided
-from crescentlab.analysis.linear.derivatives import Derivatives, Output, Point, output_named
 from crescentlab.analysis.linear.inputs import Input, Inputs
 from crescentlab.analysis.linear.reduction import Reduction, still_states
-from crescentlab.analysis.linear.sampled import tick_map, tick_period
 from crescentlab.analysis.linear.transfer_paths import check_paths
+from crescentlab.analysis.tick_map import tick_map
 from crescentlab.circuit import Circuit, Start, snapshot_of
 from crescentlab.elaborate import Design
 from crescentlab.errors import InputError
@@ -202,6 +202,21 @@ def _acting(wanted: Input, system: System, outputs: Sequence[Output]) -> Input:
     return replace(wanted, direction=direction)
 
 
+def _tick_period(system: System, p: Array) -> float | None:
+    """The one period of all ticks [s]; None without ticks; raises :class:`InputError` for several."""
+    names = [event.name for event in system.events if event.kind == "every"]
+    if not names:
+        return None
+    periods = np.array(system.period(p)).ravel()
+    if np.ptp(periods) > 1e-12 * periods[0]:
+        shown = ", ".join(f"{n} every {t * 1e6:.4g} us" for n, t in zip(names, periods, strict=True))
+        raise InputError(
+            f"the ticks have several periods ({shown}); a linear model needs one: give these parts equal periods "
+            "(for lines: internal_nodes and courant_number), or make them part of the differential equations"
+        )
+    return float(periods[0])
+
+
 class _Linearising:
     """One linearisation at work."""
 
@@ -221,7 +236,7 @@ class _Linearising:
         self.warnings: list[str] = []
 
     def done(self) -> LinearModel:
-        period = tick_period(self.system, self.point.p)
+        period = _tick_period(self.system, self.point.p)
         model = self.continuous() if period is None else self.sampled(period)
         if period is None:
             self._check_time()
@@ -290,7 +305,7 @@ class _Linearising:
         units = np.concatenate([self.sizes, held, [u.quantity.nominal for u in self.inputs]])
         start = self._just_after_a_tick(period)
         local = self.derivatives.at(start)
-        made = tick_map(self.derivatives, start, self.directions, units)
+        made = tick_map(self.derivatives, start, period, self.directions, units)
         C = np.hstack([local.y_x, local.y_h]) * units[: n + s.h.numel()]
         small = Reduction(made, C, np.concatenate([s.counting_states, s.counting_held]), n)
         small.reduce()
@@ -300,8 +315,8 @@ class _Linearising:
         powers = small.powers[keep] * scale[:, None, None] / u
         direct = made.direct[keep] * scale[:, None] / u
         still = still_states(small.M, small.drive(), np.ones(len(small.M)), self._pattern(), small.kept)
-        if made.change > 1e-6:
-            self.warnings.append(f"the map over a tick is known to {made.change:.1g} only: a part is too fast for it")
+        if made.doubt:
+            self.warnings.append(made.doubt)
         rest = made.step[keep[~np.concatenate([s.counting_states, s.counting_held])[keep]]]
         return LinearModel(
             tuple(names[k] for k in keep), tuple(quantities[k] for k in keep), scale, self.inputs, self.outputs,

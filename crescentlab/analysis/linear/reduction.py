@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from crescentlab.analysis.linear.sampled import TickMap
+from crescentlab.analysis.tick_map import TickMap
 
 Array = np.ndarray
 

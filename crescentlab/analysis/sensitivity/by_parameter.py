@@ -17,11 +17,11 @@ from typing import Any
 import numpy as np
 
 from crescentlab.analysis.outcome import Outcome, Window
+from crescentlab.analysis.reach import NotDifferentiableError, Parameter, Reach, Reaching
 from crescentlab.analysis.sensitivity.differences import LOOSEST, Runs, differences
 from crescentlab.analysis.sensitivity.extremes import refined
 from crescentlab.analysis.sensitivity.moved import Moving
-from crescentlab.analysis.sensitivity.parameter_map import Parameter, Reach, Reaching, find
-from crescentlab.analysis.sensitivity.replay import NotDifferentiableError
+from crescentlab.analysis.sensitivity.parameters import find
 from crescentlab.analysis.sensitivity.tones import STAYS, check_tones, refusal, tones
 from crescentlab.analysis.sensitivity.variational import trajectory_sensitivity
 from crescentlab.circuit import Circuit, Start, snapshot_of
@@ -91,7 +91,7 @@ def sensitivities(
     design = circuit.design(given)
     system = circuit.system(given)
     found = tuple(find(system, design, name) for name in parameters)
-    reaching = Reaching(circuit, system, design, given)
+    reaching = Reaching(circuit.design, system, design, given)
     quantities = tuple(outcome.quantity(system, system.values(design), design) for outcome in outcomes)
     tight = RTOL if rtol is None else rtol
     options: dict[str, Any] = {"stop": stop, "solver": solver, "rtol": tight, "compile": compile, "start": start}
@@ -229,7 +229,7 @@ class _Work:
 
     def numbers(self, more: Mapping[str, str]) -> Array:
         """The system's parameters and start values with other texts."""
-        values = self.reaching.system.values(self.reaching.circuit.design({**self.reaching.settings, **more}))
+        values = self.reaching.system.values(self.reaching.with_settings(more))
         return np.concatenate([values.p, values.x0, values.h0])
 
     def moved(self, places: list[int], sign: float) -> dict[str, str]:

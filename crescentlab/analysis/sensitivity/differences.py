@@ -11,8 +11,8 @@ from typing import Any
 import numpy as np
 
 from crescentlab.analysis.outcome import Outcome, Window
+from crescentlab.analysis.reach import Parameter, Reaching
 from crescentlab.analysis.sensitivity.extremes import refined
-from crescentlab.analysis.sensitivity.parameter_map import Parameter, Reaching
 from crescentlab.circuit import Circuit
 from crescentlab.errors import InputError, SimulationError
 from crescentlab.result import Result

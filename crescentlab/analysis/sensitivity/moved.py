@@ -14,8 +14,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from crescentlab.analysis.outcome import Outcome, Window
-from crescentlab.analysis.sensitivity.parameter_map import Reach, shifted
-from crescentlab.analysis.sensitivity.replay import NotDifferentiableError
+from crescentlab.analysis.reach import NotDifferentiableError, Reach
+from crescentlab.analysis.sensitivity.parameters import shifted
 from crescentlab.analysis.sensitivity.tones import tones
 from crescentlab.analysis.sensitivity.variational import Sensitivity
 from crescentlab.result import Result

@@ -11,6 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from crescentlab.analysis.reach import NotDifferentiableError
 from crescentlab.errors import SimulationError
 from crescentlab.solvers.hybrid import EPS, MAX_ROUNDS, Hybrid
 from crescentlab.solvers.snapshot import Snapshot
@@ -23,10 +24,6 @@ NEAR = 1e3
 """A relation has just met its boundary if it is within so many of its tolerance bands of it."""
 SAME = 1e-9
 """Relative difference of replayed and recorded values: compiled functions differ in their last digits."""
-
-
-class NotDifferentiableError(Exception):
-    """The derivative along this run is not known from the equations; the text says why."""
 
 
 @dataclass(frozen=True)

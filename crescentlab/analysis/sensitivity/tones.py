@@ -10,7 +10,7 @@ import copy
 from collections.abc import Sequence
 
 from crescentlab.analysis.outcome import Outcome, Window, frequency_of, functions, lookup
-from crescentlab.analysis.sensitivity.parameter_map import STEP, Parameter, Reaching
+from crescentlab.analysis.reach import STEP, Parameter, Reaching
 from crescentlab.elaborate import Design
 from crescentlab.errors import InputError
 from crescentlab.expressions import Value, evaluate

@@ -23,8 +23,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from crescentlab.analysis.reach import NotDifferentiableError
 from crescentlab.analysis.sensitivity.collocation import STAGES, Radau, Steps
-from crescentlab.analysis.sensitivity.replay import NotDifferentiableError, Stop, World, replay
+from crescentlab.analysis.sensitivity.replay import Stop, World, replay
 from crescentlab.analysis.sensitivity.variations import Variations
 from crescentlab.solvers.snapshot import Snapshot
 from crescentlab.solvers.trajectory import Pieces, Trajectory

@@ -1,25 +1,20 @@
 """Whether a circuit left alone near its operating point comes back: eigenvalues of the linearised equations.
 
 Without ticks those of J = dF/dy. With ticks of one period dt [s] they follow from the multipliers mu of the map over
-one tick, lambda = ln(mu)/dt: between ticks the states move by
-
-.. math:: \\dot{\\Delta x} = A\\, \\Delta x + \\bigl(B_0 + (B_1 - B_0) \\tau / \\Delta t\\bigr) \\Delta h
-
-A = df/dx, B_0 and B_1 = df/dh just after a tick and just before the next (held values interpolated in between, as the
-end of a line does); at the tick the held values become T(x, h).
+one tick (:mod:`crescentlab.analysis.tick_map`), lambda = ln(mu)/dt.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 
-import casadi as ca
 import numpy as np
-from scipy.linalg import eig, expm
+from scipy.linalg import eig
 
-from crescentlab.analysis.steady.rest import Point, Site, nonzeros, tick
-from crescentlab.prepared import Evaluator, Prepared, jacobian, prepare
-from crescentlab.system import System
+from crescentlab.analysis import derivatives
+from crescentlab.analysis.steady.rest import Point, Site
+from crescentlab.analysis.tick_map import tick_map
+from crescentlab.errors import SimulationError
 from crescentlab.units import QUANTITIES
 
 Array = np.ndarray
@@ -73,8 +68,10 @@ def stability(site: Site, point: Point, active: Array) -> Stability | str:
         return "not looked at, ticks of several periods"
     if not active.size:
         return Stability(None, None, None)
-    scale = site.scale(site.unknowns(point))[active]
-    matrix = (_matrix(site, point)[np.ix_(active, active)] * scale) / scale[:, None]
+    try:
+        matrix = _matrix(site, point)[np.ix_(active, active)]
+    except SimulationError as error:
+        return f"not looked at, {error}"
     values = np.linalg.eigvals(matrix)
     exponents, rounding = values.astype(complex), ROUNDING * np.abs(values).max()
     if site.periods.size:
@@ -101,43 +98,17 @@ def _partaking(matrix: Array, value: complex) -> int:
 
 
 def _matrix(site: Site, point: Point) -> Array:
-    """dF/dy, or with ticks the map of the unknowns over one of them; shape (N, N)."""
+    """In units of the site's scale: dF/dy, or with ticks the map of the unknowns over one of them; shape (N, N)."""
+    system, states, held = site.system, site.equations.states, site.equations.held
     if not site.periods.size:
-        return np.asarray(site.rates(point)[1].toarray())
-    system, dt = site.system, float(site.periods[0])
-    n, k = system.x.numel(), system.h.numel()
-    prepared, patterns = system.once("map over a tick", lambda: _map(system))
-    A, B_0, B_1, X_x, X_h, T_x, T_h = _filled(patterns, Evaluator(prepared, site.values.p), site.t, point)
-    whole = np.zeros((3 * n, 3 * n))  # exp(A dt), and the integrals of exp(A (dt - s)) and of exp(A (dt - s)) s over it
-    whole[:n, :n], whole[:n, n : 2 * n], whole[n : 2 * n, 2 * n :] = A, np.eye(n), np.eye(n)
-    grown, constant, linear = np.split(expm(whole * dt)[:n], 3, axis=1)
-    moved = np.block([[grown, constant @ B_0 + linear @ (B_1 - B_0) / dt], [np.zeros((k, n)), np.eye(k)]])
-    over = np.block([[X_x, X_h], [T_x, T_h]]) @ moved
-    places = np.append(site.equations.states, n + site.equations.held)
-    return np.asarray(over[np.ix_(places, places)])
-
-
-def _filled(patterns: list[ca.Sparsity], pieces: Evaluator, t: float, point: Point) -> list[Array]:
-    """The matrices of these patterns, in full."""
-    found = []
-    for pattern, values in zip(patterns, pieces(t, point.x, point.h, point.b), strict=True):
-        matrix = Site.slopes(pattern)
-        matrix.data[:] = values
-        found.append(matrix.toarray())
-    return found
-
-
-def _map(system: System) -> tuple[Prepared, list[ca.Sparsity]]:
-    """Derivatives of f after and before a tick, and of what the tick makes of states and held values."""
-    arguments, dt = system.arguments, system.periods[0]
-    flags = ca.SX.sym("fired", len(system.events))
-    fired = [float(event.kind == "every") for event in system.events]
-    slope = ca.Function("slope", arguments, [jacobian(system.f, system.h)])
-    new = tick(system)(*arguments, flags)
-    change = [jacobian(after, before) for after in new for before in (system.x, system.h)]
-    x_on = system.x + ca.DM(system.counting_states.astype(float)) * system.f * dt
-    later = [system.t + dt, x_on, system.h, system.b, system.p]
-    outputs = [system.jacobian_expression, jacobian(system.f, system.h), slope(*later)]
-    outputs += ca.Function("change", [*arguments, flags], change)(*later, fired)
-    patterns = [matrix.sparsity() for matrix in outputs]
-    return prepare("map", arguments[:-1], system.p, [nonzeros(o) for o in outputs], seldom=True), patterns
+        scale = site.scale(site.unknowns(point))
+        return np.asarray(site.rates(point)[1].toarray() * scale / scale[:, None])
+    sizes = np.append(system.nominal, [quantity.nominal for quantity in system.held_quantities])
+    sizes += np.abs(np.append(point.x, point.h))
+    at = derivatives.Point(site.t, point.x, point.h, point.b, site.values.p)
+    local = derivatives.Derivatives(system, [], [])
+    found = tick_map(local, at, float(site.periods[0]), np.zeros((0, 0)), sizes)
+    if found.doubt:
+        raise SimulationError(found.doubt)
+    places = np.append(states, system.x.numel() + held)
+    return np.asarray(found.matrix[np.ix_(places, places)])

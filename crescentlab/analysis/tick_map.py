@@ -1,11 +1,12 @@
-"""Linear model of a circuit with ticks: the exact map from just after one tick to just after the next.
+"""The map over one tick: variations of states and held values just after the next tick from those just after this one.
 
 Between ticks the variation obeys, along the operating point,
 
 .. math:: \\dot{\\delta x} = J_x(\\tau)\\,\\delta x + J_h(\\tau)\\,\\delta h + B(\\tau)\\,u(\\tau), \\; 0 \\le \\tau < T
 
 with the held values h constant, and the tick maps (x, h) by its own derivative. Input u = e^{j omega tau} is carried
-through the interval exactly, as its power series, so the response at the ticks is that to a continuous sine.
+through the interval exactly, as its power series, so the response at the ticks is that to a continuous sine; and so is
+a J_h that grows evenly (held values interpolated in between, as the end of a line does), however fast the states are.
 Magnus integrators of fourth order (Iserles & Norsett, Phil. Trans. R. Soc. A 357 (1999) 983-1019) on steps that are
 halved until the map stands still.
 """
@@ -17,9 +18,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from crescentlab.analysis.linear.derivatives import Derivatives, Point
-from crescentlab.errors import InputError
-from crescentlab.system import System
+from crescentlab.analysis.derivatives import Derivatives, Point
 
 Array = np.ndarray
 
@@ -27,8 +26,8 @@ POWERS = 22
 """Terms of the series of e^{j omega T}: at the Nyquist frequency, omega T = pi, the rest is pi^22/22! = 8e-11."""
 FIRST_STEPS, MOST_STEPS = 2, 64
 """Steps of a tick's interval, first try and last."""
-CHANGE = 1e-8
-"""Change of the scaled map from halved steps below which it is taken."""
+CHANGE, POOR = 1e-8, 1e-6
+"""Change of the scaled map from halved steps below which it is taken, and above which it is poorly known."""
 SERIES_SIZE, SERIES_TERMS = 0.5, 14
 """Norm up to which an exponential is summed, and its terms: the rest is 0.5^15/15! = 2e-17."""
 
@@ -50,60 +49,36 @@ class TickMap:
     rate: Array
     step: Array
     change: float
+    """What the last halving of the steps changed."""
     scale: Array
 
-
-def tick_period(system: System, p: Array, place: dict[str, str] | None = None) -> float | None:
-    """The one period of all ticks [s]; None without ticks; raises :class:`InputError` for several."""
-    names = [event.name for event in system.events if event.kind == "every"]
-    if not names:
-        return None
-    periods = np.array(system.period(p)).ravel()
-    if np.ptp(periods) > 1e-12 * periods[0]:
-        shown = ", ".join(f"{n} every {t * 1e6:.4g} us" for n, t in zip(names, periods, strict=True))
-        raise InputError(
-            f"the ticks have several periods ({shown}); a linear model needs one: give these parts equal periods "
-            "(for lines: internal_nodes and courant_number), or make them part of the differential equations"
-        )
-    return float(periods[0])
+    @property
+    def doubt(self) -> str | None:
+        """Says that the map is poorly known, if it is."""
+        if self.change <= POOR:
+            return None
+        return f"the map over a tick is known to {self.change:.1g} only: a part is too fast for it"
 
 
-def tick_map(derivatives: Derivatives, point: Point, directions: Array, units: Array) -> TickMap:
-    """Map over one tick from ``point``, just after a tick; ``directions`` (places, inputs) is dp/du.
+def tick_map(derivatives: Derivatives, point: Point, period: float, directions: Array, units: Array) -> TickMap:
+    """Map over one tick of ``period`` [s] from ``point``, just after a tick; ``directions`` (places, inputs) is dp/du.
 
-    ``units`` (n + k + inputs,): sizes by which states, held values and inputs are scaled.
+    ``units`` (n + k + inputs,): sizes by which states, held values and inputs are scaled. Raises
+    :class:`SimulationError` for derivatives that are not finite.
     """
     system = derivatives.system
-    period = tick_period(system, point.p)
-    assert period is not None
+    n, k, m = system.x.numel(), system.h.numel(), directions.shape[1]
+    scale = units[: n + k]
     rate = np.where(system.counting_states, derivatives.at(point).f, 0.0)
     interval = _Interval(derivatives, point, directions, units, period, rate)
-    steps = FIRST_STEPS
-    flow = interval.flow(steps)
-    while True:
-        steps *= 2
-        finer = interval.flow(steps)
-        change = float(np.abs(finer - flow).max() / max(1.0, np.abs(finer).max()))
-        flow = finer
-        if change < CHANGE or steps >= MOST_STEPS:
-            break
-    n, k, m = system.x.numel(), system.h.numel(), directions.shape[1]
+    before, change = interval.converged()
     end = point.moved(t=point.t + period, x=point.x + rate * period)
     value, by_z, by_p = derivatives.remap(end)
-    scaled = by_z * units[: n + k] / units[: n + k, None]
-    before = np.zeros((n + k, n + k + m * POWERS))
-    before[:n, :n] = flow[:, :n]
-    before[:n, n + interval.used] = flow[:, n : n + interval.used.size]
-    before[:n, n + k :] = flow[:, n + interval.used.size :]
-    before[n:, n : n + k] = np.eye(k)
-    whole = scaled @ before
+    whole = (by_z * scale / scale[:, None]) @ before
     powers = whole[:, n + k :].reshape(n + k, m, POWERS).transpose(0, 2, 1)
-    direct = by_p @ directions * units[n + k :] / units[: n + k, None]
+    direct = by_p @ directions * units[n + k :] / scale[:, None]
     moved = value - np.concatenate([end.x, end.h])
-    speeds = interval.fastest
-    return TickMap(
-        whole[:, : n + k], powers, direct, by_z, period, speeds, moved / units[: n + k], change, units[: n + k]
-    )
+    return TickMap(whole[:, : n + k], powers, direct, by_z, period, interval.fastest, moved / scale, change, scale)
 
 
 class _Interval:
@@ -119,8 +94,13 @@ class _Interval:
         self.fastest = np.zeros(n)
         """Largest magnitude of f met on the way."""
         self.used = np.arange(k)
-        pattern = self._matrices(0.0)[1], self._matrices(period / 2)[1], self._matrices(period)[1]
-        self.used = np.flatnonzero(sum(np.abs(p) for p in pattern).any(axis=0)) if k else self.used
+        """Held values that f reads."""
+        first, middle, last = (self._matrices(tau)[1] for tau in (0.0, period / 2, period))
+        self.used = np.flatnonzero((np.abs(first) + np.abs(middle) + np.abs(last)).any(axis=0))
+        rise = (last - first)[:, self.used]
+        self.rising = np.flatnonzero(rise.any(axis=0))
+        """Which of those it reads more or less as time goes on, and by how much over the tick, were it evenly."""
+        self.rise = rise[:, self.rising]
 
     def _matrices(self, tau: float) -> tuple[Array, Array, Array]:
         local = self.derivatives.at(self.point.moved(t=self.point.t + tau, x=self.point.x + self.rate * tau))
@@ -131,24 +111,42 @@ class _Interval:
         return f_x, f_h, f_u
 
     def parts(self, tau: float) -> tuple[Array, Array]:
-        """Scaled J_x and what drives it: by the held values that f reads, then by the powers of each input."""
+        """Scaled J_x and what drives it: the held values that f reads, the powers of each input, the even rises."""
         f_x, f_h, f_u = self._matrices(tau)
-        drive = np.zeros((f_x.shape[0], f_h.shape[1] + f_u.shape[1] * POWERS))
-        drive[:, : f_h.shape[1]] = f_h
-        drive[:, f_h.shape[1] :: POWERS] = f_u
-        return f_x, drive
+        f_h[:, self.rising] -= self.rise * tau / self.period
+        powers = np.zeros((f_x.shape[0], f_u.shape[1] * POWERS))
+        powers[:, ::POWERS] = f_u
+        return f_x, np.hstack([f_h, powers, self.rise])
 
     def shift(self) -> Array:
-        """How held values (not at all) and powers go on by themselves: (tau/T)^k/k! grows by the power below it."""
-        k, m = self.used.size, self.directions.shape[1]
-        rate = np.zeros((k + m * POWERS,) * 2)
+        """How all that drives goes on by itself: (tau/T)^k/k! grows by the power below it, (tau/T) h by h, h not."""
+        k, m, r = self.used.size, self.directions.shape[1], self.rising.size
+        rate = np.zeros((k + m * POWERS + r,) * 2)
         for j in range(POWERS - 1):
             rows = k + POWERS * np.arange(m) + j
             rate[rows, rows + 1] = 1 / self.period
+        rate[k + m * POWERS + np.arange(r), self.rising] = 1 / self.period
         return rate
 
+    def converged(self) -> tuple[Array, float]:
+        """(x, h) at the end per (x, h, powers) at the begin, by steps halved until it stands still; the last change."""
+        steps, change = FIRST_STEPS, np.inf
+        flow = self.flow(steps)
+        while not change < CHANGE and steps < MOST_STEPS:
+            steps *= 2
+            finer = self.flow(steps)
+            change = float(np.abs(finer - flow).max(initial=0.0) / max(1.0, np.abs(finer).max(initial=0.0)))
+            flow = finer
+        n, k, used = self.point.x.size, self.point.h.size, self.used.size
+        whole = np.zeros((n + k, n + k + self.directions.shape[1] * POWERS))
+        whole[:n, :n] = flow[:, :n]
+        whole[:n, n + self.used] = flow[:, n : n + used]
+        whole[:n, n + k :] = flow[:, n + used : flow.shape[1] - self.rising.size]
+        whole[n:, n : n + k] = np.eye(k)
+        return whole, change
+
     def flow(self, steps: int) -> Array:
-        """x at the end per (x, held values, powers) at the begin, shape (n, n + k + m POWERS)."""
+        """x at the end per x and all that drives it at the begin, shape (n, n + used + m POWERS + rising)."""
         h = self.period / steps
         offset = np.sqrt(3) / 6
         n, N = self.point.x.size, self.shift()
