@@ -6,11 +6,11 @@ from pydantic import BaseModel, Field, model_validator
 
 from crescentlab.component import Component, Equations
 from crescentlab.domain import gives_signal, held, observable, state, takes_signal
-from crescentlab.maths import Expr, every, sqrt, when
+from crescentlab.maths import Expr, every, initially, sqrt
 from crescentlab.units import Ratio, Time
 
 from .signal_arithmetic import limited, limited_at_once, limits_in_order
-from .signal_quantities import Inferring, InputValue, OutputValue, QuantityName
+from .signal_quantities import Inferring, InputDifference, OutputDifference, OutputValue, QuantityName
 
 
 class Tuning(Inferring, BaseModel):
@@ -23,8 +23,8 @@ class Tuning(Inferring, BaseModel):
 
     output_quantity: QuantityName = Field(default="ratio", description="quantity of the output; default: the unit's")
     input_quantity: QuantityName = Field(default="ratio", description="quantity of the inputs; default: the unit's")
-    gain: OutputValue = Field(description="proportional part of the output when the error is `per`; below 0 reverses")
-    per: InputValue = Field(default=1.0, gt=0, description="error that gives `gain`")
+    gain: OutputDifference = Field(description="proportional part of the output at the error `per`; below 0 reverses")
+    per: InputDifference = Field(default=1.0, gt=0, description="error that gives `gain`")
     integral_time: Time | None = Field(default=None, gt=0, description="integral time; none: no integral part")
     derivative_time: Time | None = Field(default=None, gt=0, description="derivative time; none: no derivative part")
     derivative_filter: Ratio = Field(default=10.0, gt=0, description="N: derivative_time over its filter's time")
@@ -99,7 +99,7 @@ class PID(Tuning, Component):
         if self.derivative_time is not None:
             v = v - K * self.derivative_filter * (measured - filtered)
             der_filtered = self.derivative_filter / self.derivative_time * (measured - filtered)
-            events["begins"] = when(begun == 0, filtered=measured, begun=1.0)
+            events["begins"] = initially(begun == 0, filtered=measured, begun=1.0)
         if self.integral_time is not None:
             v = v + integral
         u = limited(v, self.low, self.high)
@@ -153,6 +153,6 @@ class SampledPID(Tuning, Component):
         first = self.sampled(setpoint, measured, integral, derivative, measured)
         return {
             "output": held_output,
-            "begins": when(begun == 0, begun=1.0, **first),
+            "begins": initially(begun == 0, begun=1.0, **first),
             "samples": every(self.sample_time, **self.sampled(setpoint, measured, integral, derivative, previous)),
         }

@@ -10,7 +10,7 @@ from crescentlab.domain import gives_signal, held
 from crescentlab.maths import Expr, cos, every, fmod, log, pi, sqrt, where
 from crescentlab.units import Ratio, Time
 
-from .signal_quantities import Inferring, OutputValue, QuantityName
+from .signal_quantities import Inferring, OutputDifference, OutputValue, QuantityName
 
 MODULI = (2147483563.0, 2147483399.0)
 MULTIPLIERS = (40014.0, 40692.0)
@@ -63,7 +63,7 @@ class Noise(Inferring, Component):
 
     output_quantity: QuantityName = Field(default="ratio", description="quantity of the signal; default: the unit's")
     mean: OutputValue = Field(default=0.0, description="expected value")
-    standard_deviation: OutputValue = Field(ge=0, description="standard deviation")
+    standard_deviation: OutputDifference = Field(ge=0, description="standard deviation")
     sample_time: Time = Field(gt=0, description="time from sample to sample")
     distribution: Literal["normal", "uniform"] = Field(default="normal", description="distribution of the samples")
     seed: Annotated[Ratio, AfterValidator(_whole)] = Field(

@@ -10,7 +10,7 @@ from crescentlab.domain import gives_signal, takes_signal
 from crescentlab.maths import Expr, event_where, maximum, minimum, stack, total
 from crescentlab.units import Ratio
 
-from .signal_quantities import Inferring, InputValue, OutputValue, QuantityName
+from .signal_quantities import Inferring, InputDifference, OutputDifference, OutputValue, QuantityName
 
 
 class Gain(Inferring, Component):
@@ -26,8 +26,8 @@ class Gain(Inferring, Component):
 
     output_quantity: QuantityName = Field(default="ratio", description="quantity of the output; default: the unit's")
     input_quantity: QuantityName = Field(default="ratio", description="quantity of the input; default: the unit's")
-    gain: OutputValue = Field(description="output when the input is `per`")
-    per: InputValue = Field(default=1.0, gt=0, description="input that gives `gain`")
+    gain: OutputDifference = Field(description="output when the input is `per`")
+    per: InputDifference = Field(default=1.0, gt=0, description="input that gives `gain`")
 
     u = takes_signal("input_quantity", "input")
     y = gives_signal("output_quantity", "the output")
@@ -49,7 +49,7 @@ class Sum(Inferring, Component):
     inferred: ClassVar[dict[str, tuple[str, ...]]] = {"output_quantity": ("offset",)}
 
     output_quantity: QuantityName = Field(default="ratio", description="quantity of all signals; default: the offset's")
-    offset: OutputValue = Field(default=0.0, description="added to the sum")
+    offset: OutputDifference = Field(default=0.0, description="added to the sum")
     weights: list[Ratio] = Field(default=[1.0, 1.0], description="weight of each input")
 
     u = takes_signal("output_quantity", "inputs", size="count")
@@ -136,7 +136,7 @@ class DeadBand(Inferring, Component):
     inferred: ClassVar[dict[str, tuple[str, ...]]] = {"output_quantity": ("half_width",)}
 
     output_quantity: QuantityName = Field(default="ratio", description="quantity of the signals; default: the unit's")
-    half_width: OutputValue = Field(ge=0, description="largest input without an output")
+    half_width: OutputDifference = Field(ge=0, description="largest input without an output")
 
     u = takes_signal("output_quantity", "input")
     y = gives_signal("output_quantity", "what exceeds the band")

@@ -6,7 +6,7 @@ from pydantic import Field
 
 from crescentlab.component import Component, Equations
 from crescentlab.domain import gives_signal, held, state, takes_signal
-from crescentlab.maths import Expr, every, stack, when
+from crescentlab.maths import Expr, every, initially, stack
 from crescentlab.units import Ratio, Time
 
 from .signal_filters import CanonicalForm
@@ -34,7 +34,7 @@ class SampleAndHold(Component):
     def equations(self, sample: Expr, begun: Expr, u: Expr) -> Equations:
         return {
             "y": sample,
-            "begins": when(begun == 0, sample=u, begun=1.0),
+            "begins": initially(begun == 0, sample=u, begun=1.0),
             "samples": every(self.sample_time, sample=u),
         }
 
@@ -71,7 +71,7 @@ class Delay(Component):
         share = (t - sampled_at) / step
         return {
             "y": past[0] + (past[1] - past[0]) * share,
-            "begins": when(begun == 0, past=stack(*[u] * self.kept), sampled_at=t, begun=1.0),
+            "begins": initially(begun == 0, past=stack(*[u] * self.kept), sampled_at=t, begun=1.0),
             "samples_u": every(step, past=stack(past, u)[1:], sampled_at=t),
         }
 
@@ -112,5 +112,5 @@ class PadeDelay(Component):
         return {
             "y": form.output(x, u),
             "der_x": form.rates(x, u, self.delay),
-            "begins": when(begun == 0, x=stack(u, *[0.0] * (self.order - 1)), begun=1.0),
+            "begins": initially(begun == 0, x=stack(u, *[0.0] * (self.order - 1)), begun=1.0),
         }

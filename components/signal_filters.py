@@ -11,7 +11,7 @@ from crescentlab.domain import gives_signal, state, takes_signal
 from crescentlab.maths import Expr, pi, stack, total
 from crescentlab.units import Frequency, Ratio, Time
 
-from .signal_quantities import Inferring, InputValue, OutputValue, QuantityName
+from .signal_quantities import Inferring, InputDifference, OutputDifference, QuantityName
 
 
 class Integrator(Inferring, Component):
@@ -28,8 +28,8 @@ class Integrator(Inferring, Component):
 
     output_quantity: QuantityName = Field(default="ratio", description="quantity of the output; default: the unit's")
     input_quantity: QuantityName = Field(default="ratio", description="quantity of the input; default: the unit's")
-    rate: OutputValue = Field(default=1.0, description="change of the output within `within` while the input is `per`")
-    per: InputValue = Field(default=1.0, gt=0, description="input that gives `rate`")
+    rate: OutputDifference = Field(default=1.0, description="change of the output within `within` at the input `per`")
+    per: InputDifference = Field(default=1.0, gt=0, description="input that gives `rate`")
     within: Time = Field(default=1.0, gt=0, description="time in which `rate` is gained")
 
     u = takes_signal("input_quantity", "input")
@@ -54,8 +54,8 @@ class FirstOrderLag(Inferring, Component):
 
     output_quantity: QuantityName = Field(default="ratio", description="quantity of the output; default: the unit's")
     input_quantity: QuantityName = Field(default="ratio", description="quantity of the input; default: the unit's")
-    gain: OutputValue = Field(default=1.0, description="output at rest when the input is `per`")
-    per: InputValue = Field(default=1.0, gt=0, description="input that gives `gain`")
+    gain: OutputDifference = Field(default=1.0, description="output at rest when the input is `per`")
+    per: InputDifference = Field(default=1.0, gt=0, description="input that gives `gain`")
     time_constant: Time = Field(gt=0, description="time to 63 % of a step")
 
     u = takes_signal("input_quantity", "input")
@@ -82,8 +82,8 @@ class SecondOrderLag(Inferring, Component):
 
     output_quantity: QuantityName = Field(default="ratio", description="quantity of the output; default: the unit's")
     input_quantity: QuantityName = Field(default="ratio", description="quantity of the input; default: the unit's")
-    gain: OutputValue = Field(default=1.0, description="output at rest when the input is `per`")
-    per: InputValue = Field(default=1.0, gt=0, description="input that gives `gain`")
+    gain: OutputDifference = Field(default=1.0, description="output at rest when the input is `per`")
+    per: InputDifference = Field(default=1.0, gt=0, description="input that gives `gain`")
     natural_frequency: Frequency = Field(gt=0, description="undamped natural frequency")
     damping_ratio: Ratio = Field(default=0.7, ge=0, description="damping over critical damping")
 
@@ -153,8 +153,8 @@ class TransferFunction(Inferring, Component):
 
     output_quantity: QuantityName = Field(default="ratio", description="quantity of the output; default: the unit's")
     input_quantity: QuantityName = Field(default="ratio", description="quantity of the input; default: the unit's")
-    gain: OutputValue = Field(default=1.0, description="output that the polynomials' ratio 1 stands for at `per`")
-    per: InputValue = Field(default=1.0, gt=0, description="input that gives `gain`")
+    gain: OutputDifference = Field(default=1.0, description="output that the polynomials' ratio 1 stands for at `per`")
+    per: InputDifference = Field(default=1.0, gt=0, description="input that gives `gain`")
     numerator: list[Ratio] = Field(default=[1.0], min_length=1, description="coefficients, highest power first")
     denominator: list[Ratio] = Field(default=[1.0, 1.0], min_length=1, description="coefficients, highest power first")
     time_unit: Time = Field(default=1.0, gt=0, description="time in whose units s counts")
@@ -172,6 +172,8 @@ class TransferFunction(Inferring, Component):
     def _proper(self) -> Self:
         if self.denominator[0] == 0:
             raise ValueError("the first coefficient of the denominator is 0; leave it out")
+        if self.numerator[0] == 0 and len(self.numerator) > 1:
+            raise ValueError("the first coefficient of the numerator is 0; leave it out")
         if len(self.numerator) > len(self.denominator):
             raise ValueError(
                 f"the numerator has order {len(self.numerator) - 1}, the denominator {self.order}; a filter cannot "

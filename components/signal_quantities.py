@@ -20,15 +20,21 @@ def _known(name: str) -> str:
         raise PydanticCustomError("quantity", "{reason}", {"reason": error.message}) from None
 
 
-def _reader(quantity_field: str) -> BeforeValidator:
-    """Reads text in a unit of the quantity that `quantity_field`, declared earlier, names."""
+def _reader(quantity_field: str, *, difference: bool = False) -> BeforeValidator:
+    """Reads text in a unit of the quantity that `quantity_field`, declared earlier, names.
+
+    A `difference` has no unit that counts from a zero of its own: 10 K, not 10 degC.
+    """
 
     def read(value: Any, info: ValidationInfo) -> Any:
         if not isinstance(value, str):
             return value
         try:
             name = info.data.get(quantity_field)
-            return units.quantity_named(name).parse(value) if name else units.parse_any(value)[0]
+            number, quantity = units.parse_any(value) if not name else (0.0, units.quantity_named(name))
+            if difference:
+                quantity.check_difference(value)
+            return quantity.parse(value) if name else number
         except UnitError as error:
             raise PydanticCustomError("unit", "{reason}", {"reason": error.message}) from None
 
@@ -40,6 +46,12 @@ QuantityName = Annotated[str, AfterValidator(_known)]
 
 OutputValue = Annotated[float, _reader("output_quantity")]
 """A number of the quantity that `output_quantity` names; text with a unit, or SI."""
+
+OutputDifference = Annotated[float, _reader("output_quantity", difference=True)]
+"""A difference of two values of the quantity that `output_quantity` names; text with a unit, or SI."""
+
+InputDifference = Annotated[float, _reader("input_quantity", difference=True)]
+"""A difference of two values of the quantity that `input_quantity` names; text with a unit, or SI."""
 
 InputValue = Annotated[float, _reader("input_quantity")]
 """A number of the quantity that `input_quantity` names; text with a unit, or SI."""

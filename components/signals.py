@@ -1,15 +1,16 @@
 """Signals made from time: constant, step, ramp, oscillations, pulse. Arithmetic and tables have files of their own."""
 
-from typing import ClassVar, Literal, Self
+import math
+from typing import Any, ClassVar, Literal, Self
 
 from pydantic import Field, model_validator
 
 from crescentlab.component import Component, Equations
 from crescentlab.domain import gives_signal, held, observable
-from crescentlab.maths import Expr, event_where, exp, log, pi, sin, when
+from crescentlab.maths import Expr, event_where, exp, fmod, log, maximum, pi, sin, when
 from crescentlab.units import Angle, Frequency, Time
 
-from .signal_quantities import Inferring, OutputValue, QuantityName
+from .signal_quantities import Inferring, OutputDifference, OutputValue, QuantityName
 
 
 class Constant(Inferring, Component):
@@ -93,7 +94,7 @@ class Sine(Inferring, Component):
 
     output_quantity: QuantityName = Field(default="ratio", description="quantity of the signal; default: the unit's")
     mean: OutputValue = Field(default=0.0, description="mean value")
-    amplitude: OutputValue = Field(description="half of the swing from lowest to highest")
+    amplitude: OutputDifference = Field(description="half of the swing from lowest to highest")
     frequency: Frequency = Field(gt=0, description="periods per time")
     phase: Angle = Field(default=0.0, description="phase at time zero")
 
@@ -120,7 +121,7 @@ class Chirp(Inferring, Component):
 
     output_quantity: QuantityName = Field(default="ratio", description="quantity of the signal; default: the unit's")
     mean: OutputValue = Field(default=0.0, description="mean value")
-    amplitude: OutputValue = Field(description="half of the swing from lowest to highest")
+    amplitude: OutputDifference = Field(description="half of the swing from lowest to highest")
     start_frequency: Frequency = Field(gt=0, description="frequency at the start of the sweep")
     end_frequency: Frequency = Field(gt=0, description="frequency at its end")
     duration: Time = Field(gt=0, description="time the sweep takes")
@@ -155,6 +156,13 @@ class Chirp(Inferring, Component):
         }
 
 
+def _last_before_the_start(pulse: Any) -> float:
+    """Begin [s] of the first pulse, or of the last one before the time 0."""
+    if pulse.period is None or pulse.at >= 0:
+        return float(pulse.at)
+    return float(pulse.at + pulse.period * math.floor(-pulse.at / pulse.period))
+
+
 class Pulse(Inferring, Component):
     r"""Rectangular pulse, once or again and again.
 
@@ -175,10 +183,15 @@ class Pulse(Inferring, Component):
     period: Time | None = Field(default=None, gt=0, description="time from pulse to pulse; none: one pulse")
 
     y = gives_signal("output_quantity", "the value")
-    begun = held(Time, "begin of the present pulse", start="at", counts=True)
+    begun = held(Time, "begin of the present pulse", start=_last_before_the_start, counts=True)
 
     def equations(self, t: Expr, begun: Expr) -> Equations:
-        value = event_where((t >= begun) & (t < begun + self.width), self.high, self.low)
+        now = (t >= begun) & (t < begun + self.width)
         if self.period is None:
-            return {"y": value}
-        return {"y": value, "again": when(t >= begun + self.period, begun=begun + self.period)}
+            return {"y": event_where(now, self.high, self.low)}
+        following = t >= begun + self.period  # what samples at this instant sees the edge before `again` fires
+        passed = (t - begun - fmod(t - begun, self.period)) / self.period
+        return {
+            "y": event_where(now | following, self.high, self.low),
+            "again": when(following, begun=begun + self.period * maximum(passed, 1.0)),
+        }

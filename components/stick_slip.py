@@ -121,7 +121,8 @@ class StickSlipMassWithStops(_Rubbing, Component):
         rebound = -self.restitution * v
         fast = fabs(rebound) > self.rest_speed
         law = self._law(x, v, up | down, direction, f_port)
-        outside = where((x <= self.low) & (v <= 0), -1.0, where((x >= self.high) & (v >= 0), 1.0, 0.0))
+        slow = fabs(v) <= self.rest_speed
+        outside = where(slow & (x <= self.low), -1.0, where(slow & (x >= self.high), 1.0, 0.0))
         start = where(fabs(outside) > 0.5, 0.0, v)
         return {
             **law,

@@ -27,6 +27,9 @@ from crescentlab.units import Quantity
 
 Array = np.ndarray
 
+INPUTS = 4
+"""Place of the port inputs among the arguments of a trace's functions."""
+
 
 def assemble(plan: Plan) -> System:
     """Make the global ODE of a plan."""
@@ -166,6 +169,7 @@ class _Assembly:
             bits=self.bits(g, b),
             _variables=self.variables,
             remapping=self.remap,
+            reading=self.reading,
             _contents=self.contents(),
             _energies=self.energies,
         )
@@ -215,6 +219,7 @@ class _Assembly:
                 event.kind,
                 f"{name}: {event.message}" if event.message else "",
                 tuple(f"{name}.{n}" for n in event.message_names),
+                event.initial,
             )
             for name, trace in self.plan.traces.items()
             for event in trace.events
@@ -291,6 +296,27 @@ class _Assembly:
                 new_x, new_h = ca.vertsplit(ca.if_else(flag, after, now), [0, trace.states.size, now.shape[0]])
                 x.nz[own_x], h.nz[own_h] = ca.vec(new_x), ca.vec(new_h)
         return fired, [x, h]
+
+    def reading(self, events: Sequence[int]) -> Array:
+        """Which initial event of these reads through its ports what the component of which other one sets; (m, m)."""
+        owners = [(name, event) for name, trace in self.plan.traces.items() for event in trace.events]
+        chosen = [owners[k] for k in events if k < len(owners)]
+        sets: dict[int, list[int]] = {}
+        for j, (name, _) in enumerate(chosen):
+            own_x, own_h = self.states.indices(name), self.held.indices(name)
+            for place in [*own_x, *(self.x.numel() + k for k in own_h)]:
+                sets.setdefault(place, []).append(j)
+        found = np.zeros((len(events), len(events)), bool)
+        known = ca.vertcat(self.x, self.h)
+        for i, (name, event) in enumerate(chosen):
+            if event.remap is None or not event.initial:
+                continue
+            asked = sorted(set(event.remap.jac_sparsity(0, INPUTS).get_triplet()[1]))
+            own = self.input_of.indices(name)
+            inputs = self.inputs.nz[[own[k] for k in asked]]
+            for place in set(ca.jacobian_sparsity(inputs, known).get_triplet()[1]) if asked else ():
+                found[i, [j for j in sets.get(place, []) if chosen[j][0] != name]] = True
+        return found
 
     # -- variables -------------------------------------------------------------------------------
 

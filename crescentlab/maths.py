@@ -44,6 +44,8 @@ class Event:
 
     condition: Any
     then: dict[str, Any]
+    initial: bool = False
+    """Whether it waits at the start of a run until what it reads has been set."""
 
 
 @dataclass(frozen=True)
@@ -65,6 +67,14 @@ class Failure:
 def when(condition: Any, **then: Any) -> Event:
     """Set the named states and held values each time ``condition`` becomes true."""
     return Event(condition, then)
+
+
+def initially(condition: Any, **then: Any) -> Event:
+    """As :func:`when`, for what a part takes over from its inputs at the start: first samples, resting filters.
+
+    It waits there until the events of the parts that it reads have set their own values.
+    """
+    return Event(condition, then, initial=True)
 
 
 def every(dt: Any, **then: Any) -> Tick:

@@ -51,6 +51,8 @@ class SystemEvent:
     """``when``, ``every``, ``fail`` or ``stop``."""
     message: str = ""
     message_names: tuple[str, ...] = ()
+    initial: bool = False
+    """Whether it waits at the start until what it reads has been set."""
 
 
 @dataclass(frozen=True)
@@ -111,6 +113,8 @@ class System:
     _variables: Callable[[], dict[str, Variable]]
     remapping: Callable[[list[bool]], tuple[ca.SX, list[ca.SX]]]
     """Which events may fire -> symbols (1 where one fires), and the new x and h as expressions of them."""
+    reading: Callable[[Sequence[int]], Array]
+    """Events -> which of them reads what the component of which other one sets, shape (m, m)."""
     _contents: dict[str, tuple[Callable[[], ca.SX], Callable[[], tuple[ca.SX, ca.SX]]]]
     _energies: Callable[[], dict[str, ca.SX]]
     _functions: dict[Any, ca.Function] = field(default_factory=dict)

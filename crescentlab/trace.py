@@ -90,6 +90,8 @@ class EventInfo:
     remap: ca.Function | None = None
     message: str = ""
     message_names: tuple[str, ...] = ()
+    initial: bool = False
+    """Whether it waits at the start until what it reads has been set."""
 
 
 @dataclass(frozen=True)
@@ -348,9 +350,8 @@ class _Tracing:
                 )
                 conditions.append(condition)
             elif isinstance(value, Event):
-                infos.append(
-                    EventInfo(name, "when", condition=len(conditions), remap=function("remap", self.remap(value.then)))
-                )
+                remap = function("remap", self.remap(value.then))
+                infos.append(EventInfo(name, "when", condition=len(conditions), remap=remap, initial=value.initial))
                 conditions.append(condition)
             elif isinstance(value, Tick):
                 period = Sym.of(value.dt).sx

@@ -66,6 +66,12 @@ class Quantity:
             )
         raise UnitError(f"{said}unknown unit {unit!r} for {self.titled}; write one of {self.choices()}")
 
+    def check_difference(self, text: str) -> None:
+        """Refuse a difference in a unit that counts from a zero of its own."""
+        match = _NUMBER.match(text)
+        if match and self.offsets.get(normalise(match[2])):
+            raise UnitError(f"{text!r}: this is a difference of two {self.title}s; write {match[1]} {self.si}")
+
     @property
     def title(self) -> str:
         """The quantity's name in words."""

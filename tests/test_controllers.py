@@ -204,3 +204,40 @@ def test_position_servo_settles():
     falling = (result.time > 1.1) & (result["error"] < 3 * MM) & (result["error"] > 0.5 * MM)
     rate = -np.polyfit(result.time[falling], np.log(result["error"][falling]), 1)[0]
     assert rate == pytest.approx(root, rel=3e-2)
+
+
+def test_what_reads_a_sample_starts_from_it():
+    """50 bar through a sampler: a delay, its approximation, another sampler and a filter begin with 50 bar, not 0."""
+    pressure = {"output_quantity": "pressure"}
+    parts = {
+        "source": {"type": "constant", "value": "50 bar"},
+        "sampler": {"type": "sample_and_hold", "sample_time": "10 ms", **pressure},
+        "second": {"type": "sample_and_hold", "sample_time": "7 ms", **pressure},
+        "delay": {"type": "delay", "delay": "40 ms", "samples": "8", **pressure},
+        "pade": {"type": "pade_delay", "delay": "40 ms", **pressure},
+        "pid": {"type": "pid", "gain": "2", "per": "1 bar", "derivative_time": "0.1 s", "input_quantity": "pressure"},
+        "sampled": {"type": "sampled_pid", "gain": "2", "per": "1 bar", "derivative_time": "0.1 s",
+                    "sample_time": "10 ms", "input_quantity": "pressure"},
+    }  # fmt: skip
+    nets = {
+        "u": ["source.y", "sampler.u", "pid.setpoint", "sampled.setpoint"],
+        "s": ["sampler.y", "second.u", "delay.u", "pade.u", "pid.measured", "sampled.measured"],
+        "a": ["second.y"], "b": ["delay.y"], "c": ["pade.y"], "d": ["pid.output"], "e": ["sampled.output"],
+    }  # fmt: skip
+    run = circuit(components=parts, nets=nets, simulation={"stop": "100 ms"}).simulate()
+    for name in ("second.y", "delay.y", "pade.y"):
+        np.testing.assert_allclose(run[name], 50e5, rtol=1e-9)
+    for name in ("pid.output", "sampled.output"):
+        np.testing.assert_allclose(run[name], 0.0, atol=1e-9)
+
+
+def test_what_reads_a_mass_starts_after_it_is_on_its_stop():
+    """A mass started 20 mm out, beyond its stop at 9 mm: what is sampled at once is 9 mm."""
+    parts = {
+        "mass": {"type": "mass_with_stops", "mass": "1 kg", "high": "9 mm", "start": {"x": "20 mm"}},
+        "sensor": {"type": "position_sensor"},
+        "sampler": {"type": "sample_and_hold", "sample_time": "1 s", "output_quantity": "length"},
+    }
+    nets = {"m": ["mass.port", "sensor.port"], "x": ["sensor.y", "sampler.u"], "s": ["sampler.y"]}
+    run = circuit(components=parts, nets=nets, simulation={"stop": "10 ms"}).simulate()
+    assert run["sampler.y"][-1] == pytest.approx(9e-3)

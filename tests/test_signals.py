@@ -12,6 +12,7 @@ from crescentlab.components.signal_tables import Table, TimeTable
 from crescentlab.components.signals import Chirp, Constant, Pulse, Ramp, Sine, Step
 from reading import rows
 
+from crescentlab.errors import InputError
 from crescentlab.maths import Event
 
 BAR, LPM = 1e5, 1e-3 / 60
@@ -288,3 +289,45 @@ def test_wrong_formulas_are_explained(given, text):
     """When the circuit is read, not when it runs."""
     with pytest.raises(ValueError, match=text):
         Expression(**given)
+
+
+@pytest.mark.parametrize(
+    ("times", "mean"),
+    [
+        ({"at": "-250 ms", "period": "100 ms", "width": "40 ms"}, 1.4),
+        ({"at": "-1 s", "period": "10 ms", "width": "4 ms"}, 1.4),
+        ({"at": "-70 ms", "width": "100 ms"}, 1.03),
+    ],
+)
+def test_a_pulse_that_began_before_the_start_goes_on(times, mean):
+    """Mean over one second of 1 outside and 2 within the pulses, by hand."""
+    run = circuit(
+        components={"p": {"type": "pulse", "high": "2", "low": "1", **times}}, nets={"y": ["p.y"]},
+        simulation={"stop": "1 s"},
+    ).simulate()  # fmt: skip
+    assert run.mean("p.y") == pytest.approx(mean, rel=1e-12)
+
+
+def test_what_samples_at_an_edge_sees_the_pulse():
+    """y = y_1 from t_k on: samples at the edges themselves catch every pulse, and a pulse of a whole period stays."""
+    parts = {
+        "half": {"type": "pulse", "high": "2", "low": "1", "period": "20 ms", "width": "10 ms"},
+        "whole": {"type": "pulse", "high": "2", "low": "1", "period": "10 ms", "width": "10 ms"},
+        "one": {"type": "sample_and_hold", "sample_time": "10 ms"},
+        "other": {"type": "sample_and_hold", "sample_time": "10 ms"},
+    }
+    nets = {"a": ["half.y", "one.u"], "b": ["one.y"], "c": ["whole.y", "other.u"], "d": ["other.y"]}
+    simulation = {"stop": "1 s", "stop_when": "whole.y < 1.5"}
+    run = circuit(components=parts, nets=nets, simulation=simulation).simulate()
+    assert run.time[-1] == 1.0
+    assert run.mean("one.y") == pytest.approx(1.5, rel=1e-9)
+    assert run["other.y"].min() == 2.0
+
+
+def test_differences_of_temperature_are_in_kelvin():
+    """5 degC as an amplitude would be 278 K; a mean of 40 degC is a temperature."""
+    sine = {"type": "sine", "mean": "40 degC", "frequency": "1 Hz"}
+    with pytest.raises(InputError, match="'5 degC': this is a difference of two temperatures; write 5 K"):
+        circuit(components={"s": {**sine, "amplitude": "5 degC"}}, nets={"y": ["s.y"]}).simulate(stop="1 s")
+    run = circuit(components={"s": {**sine, "amplitude": "5 K"}}, nets={"y": ["s.y"]}).simulate(stop="1 s")
+    assert run["s.y"].max() == pytest.approx(318.15, abs=0.1)

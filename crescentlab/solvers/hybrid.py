@@ -151,13 +151,18 @@ class Hybrid:
 
     # -- stops -----------------------------------------------------------------------------------
 
-    def stop(self, t: float, x: np.ndarray, due: list[int]) -> tuple[np.ndarray, list[str]]:
-        """Settle and fire at time ``t``; ``due`` are positions of ticks. Returns the state after, names fired."""
+    def stop(self, t: float, x: np.ndarray, due: list[int], *, starts: bool = False) -> tuple[np.ndarray, list[str]]:
+        """Settle and fire at time ``t``; ``due`` are positions of ticks. Returns the state after, names fired.
+
+        Where the run ``starts``, an ``initially`` waits until what it reads has been set.
+        """
         self.settle(t, x)
         names: list[str] = []
         for _ in range(MAX_ROUNDS):
             ticks = [self.ticking[k] for k in due]
             fired = self.edges(t, x) + ticks
+            if starts:
+                fired = self.foremost(fired)
             if not fired:
                 return x, names
             due = []
@@ -182,6 +187,17 @@ class Hybrid:
         risen = now & ~self.holds
         self.holds = now
         return [self.rising[k] for k in np.flatnonzero(risen)]
+
+    def foremost(self, fired: list[int]) -> list[int]:
+        """All but initial events that read what another is about to set, which may rise again; all, if none is free."""
+        if len(fired) < 2 or not any(self.system.events[k].initial for k in fired):
+            return fired
+        free = np.logical_not(np.asarray(self.system.reading(fired)).any(axis=1))
+        if not free.any():
+            return fired
+        waiting = {k for k, now in zip(fired, free, strict=True) if not now}
+        self.holds[[place for place, k in enumerate(self.rising) if k in waiting]] = False
+        return [k for k in fired if k not in waiting]
 
     def raise_failures(self, t: float, x: np.ndarray, fired: list[int]) -> None:
         for k in fired:

@@ -138,7 +138,7 @@ class _Run:
         self.diagnosis.check_finite(t, x, self.functions.rhs(t, x), "at the start")
         hybrid.begin(t, x)
         self.sync()
-        x, names = hybrid.stop(t, x, [])
+        x, names = hybrid.stop(t, x, [], starts=not hybrid.resumed)
         self.sync()
         self.booked(t, names)
         self.record(t, x)
