@@ -105,6 +105,11 @@ class _Evaporating(Fluid):
         w: Expr = (condensable + air) / self._liquid_density()
         return w
 
+    def dynamic_viscosity(self, p: Expr) -> Expr:
+        """mu(p) [Pa s] of the liquid: neither bubbles nor vapour thin it."""
+        mu: Expr = self._liquid_density() * self._liquid(p)[0] * self.kinematic_viscosity(p)
+        return mu
+
     def _specific_volume(self, p: Expr) -> Law:
         """rho_l/rho [-] and its derivative with respect to p [1/Pa]."""
         absolute = absolute_pressure(p, self.atmospheric_pressure, self.minimum_pressure)
@@ -130,7 +135,7 @@ class CavitatingOil(_Evaporating, SimpleOil):
     p [Pa] gauge, P = p + P_atm [Pa] absolute; \rho_l = `density` [kg/m^3], \beta_l = `bulk_modulus` [Pa] of the liquid;
     P_v = `vapour_pressure` [Pa], absolute; \rho_v = `vapour_density` [kg/m^3]; \theta [-] share of the volume that
     vapour takes, 0 above P_v (1 + s) and 1 below P_v (1 - s), s = `vapour_range` [-]; the free air as in
-    `aerated_oil`; \nu = `kinematic_viscosity` [m^2/s], constant. Liquid and vapour are in equilibrium, at one pressure
+    `aerated_oil`; \nu = `kinematic_viscosity` [m^2/s] of the liquid, constant. Liquid and vapour are in equilibrium, at one pressure
     in nature and within the range s here, so that a volume drawn empty and filled again holds the same mass at the same
     pressure; \rho rises with p everywhere and vanishes at absolute zero. The smaller s P_v, the tighter the tolerance
     of a run must be while oil evaporates. Not for the growth and collapse of bubbles, nor for erosion. Source:

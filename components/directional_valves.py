@@ -13,7 +13,7 @@ from crescentlab.fluid import Fluid
 from crescentlab.maths import Expr, pi
 from crescentlab.units import Area, Flow, Frequency, Ratio
 
-from .valve_laws import Metering, edge_share, follower, middle_share
+from .valve_laws import Metering, clipped, edge_share, follower, middle_share
 
 
 class Lapped(BaseModel):
@@ -49,11 +49,10 @@ class SpoolDrive(Component):
     position = state(Ratio, "stroke of the spool", start=0.0, nominal=1.0)
     rate = state(Frequency, "strokes per time", start=0.0, nominal=100.0)
     at = held(Ratio, "-1 rests at the low end, 1 at the high one, 0 free", start=0.0)
-    loss = dissipates()
 
     def equations(self, position: Expr, rate: Expr, at: Expr, command: Expr) -> Equations:
         omega = 2 * pi * self.natural_frequency
-        moves = follower(position, rate, at, command, omega, self.damping_ratio, low=-1.0)
+        moves = follower(position, rate, at, clipped(command, -1.0), omega, self.damping_ratio, low=-1.0)
         return {"stroke": position, **moves}
 
 

@@ -75,12 +75,12 @@ class ConicalPoppet(_Poppet, Component):
 
     \Delta p = p_a - p_b [Pa]; x [m] lift of the rod above `seat_position`; d = `seat_diameter`; \alpha = `half_angle`
     [rad] of the cone, along which the jet leaves; A at most the bore A_s = \pi d^2/4 [m^2]; A_r [m^2] the face outside
-    the seat, up to `face_diameter`; C_d [-] follows the flow number as in `orifice`, with the hydraulic diameter
-    2 x \sin\alpha; v_jet = \sqrt{2|\Delta p|/\rho} [m/s]; \rho [kg/m^3], \nu [m^2/s] at the mean pressure; k =
-    `jet_coefficient` [-]. F [N] on the poppet, towards increasing x. F_jet closes whichever way the fluid flows, for
-    k = 1; a deflecting rim makes k smaller, or negative: it opens. Left out: the momentum in the bore, which opens. The
-    poppet takes in A_s v at a and A_r v at b. Its back is a `spool_end`, its seat the stop of the mass. Not for seats
-    with a chamfer wider than the lift, nor for cavitating flow.
+    the seat, up to `face_diameter`; C_d [-] follows the flow number as in `orifice`, with the hydraulic diameter 2 x
+    \sin\alpha up to the lift of the largest A; v_jet = \sqrt{2|\Delta p|/\rho} [m/s]; \rho [kg/m^3], \nu [m^2/s] at the
+    mean pressure; k = `jet_coefficient` [-]. F [N] on the poppet, towards increasing x. F_jet closes whichever way the
+    fluid flows, for k = 1; a deflecting rim makes k smaller, or negative: it opens. Left out: the momentum in the bore,
+    which opens. The poppet takes in A_s v at a and A_r v at b. Its back is a `spool_end`, its seat the stop of the
+    mass. Not for seats with a chamfer wider than the lift, nor for cavitating flow.
     Source: D. McCloy, H. R. Martin, Control of Fluid Power (1980), poppet valves; geometry of a cone's frustum.
     """
 

@@ -27,8 +27,8 @@ class Metering(BaseModel):
     diameter_rounding: Length = Field(default=DIAMETER_ROUNDING, gt=0, description="rounding of the diameter at 0 area")
 
     def metered(self, p_a: Any, p_b: Any, share: Any, fluid: Fluid) -> Any:
-        """Flow [m^3/s] from a to b through `share` [-] of the area, below 0 counted as 0."""
-        return self.through(p_a, p_b, self.area * maximum(share, 0.0), fluid)
+        """Flow [m^3/s] from a to b through `share` [-] of the area, counted within 0 and 1."""
+        return self.through(p_a, p_b, self.area * clipped(share), fluid)
 
     def through(self, p_a: Any, p_b: Any, area: Any, fluid: Fluid) -> Any:
         """Flow [m^3/s] from a to b through an area [m^2] of the same kind of edge."""
@@ -156,10 +156,10 @@ def edge_share(stroke: Any, overlap: Any, rounding: Any) -> Any:
 def middle_share(stroke: Any, closed: Any, rounding: Any) -> Any:
     r"""Open share [-] of an edge that is open in the middle of the stroke, x = 0, and closes to both sides.
 
-    .. math:: s = \frac{c - |x|}{c} \quad (|x| < c), \qquad s = 0 \quad (|x| \ge c)
+    .. math:: s = \frac{c - |x|}{c - w/2} \quad (|x| < c), \qquad s = 0 \quad (|x| \ge c)
 
     c = `closed`; both corners, in the middle and at c, are rounded within w = `rounding` > 0 as in :func:`edge_share`,
-    and s is 1 in the middle. All as shares of the stroke.
+    which takes w/2 off the peak: s is 1 in the middle. All as shares of the stroke.
     """
     x = clipped(stroke, -1.0)
     away = _rounded(x, rounding) + _rounded(-x, rounding)
@@ -184,10 +184,11 @@ def follower(
 
     .. math:: \frac{d^2 x}{dt^2} = \omega^2 (x_t - x) - 2 \zeta \omega \frac{dx}{dt}, \quad x_{low} \le x \le 1
 
-    x_t = `target` [-], counted within the stops; \omega [rad/s]; \zeta = `damping_ratio` [-]. At a stop it rests until
-    the target leads away from it. at: -1 rests on the low stop, 1 on the high one, 0 free.
+    x_t = `target` [-], which may lie beyond the stops, where it pushes all the more; \omega [rad/s]; \zeta =
+    `damping_ratio` [-]. At a stop it rests until the target leads away from it. at: -1 rests on the low stop, 1 on the
+    high one, 0 free.
     """
-    pull = omega * omega * (clipped(target, low) - position) - 2 * damping_ratio * omega * rate
+    pull = omega * omega * (target - position) - 2 * damping_ratio * omega * rate
     free = at == 0
     return {
         "der_position": rate,

@@ -145,6 +145,32 @@ def test_a_pressure_below_absolute_zero(solver: str, refused: Refusal) -> None:
     assert "below absolute zero" in warning
 
 
+LINE_UNDER_TENSION = f"""\
+crescentlab: 1
+{OIL.replace("bar}", "bar, tension: true}")}
+components:
+  wave: {{type: sine, mean: 20 bar, amplitude: 30 bar, frequency: 50 Hz}}
+  source: {{type: signal_pressure_source}}
+  line: {{type: lax_wendroff_line, length: 5 m, diameter: 8 mm, max_pressure: 90 bar, start_pressure: 20 bar}}
+  end: {{type: capacity, volume: 5 cm^3, start: {{p: 20 bar}}}}
+nets:
+  u: [wave.y, source.pressure]
+  a: [source.port, line.a]
+  b: [line.b, end.port]
+simulation: {{stop: 40 ms}}
+"""
+
+
+@pytest.mark.parametrize("solver", ["auto", "rodas", "dopri", "lsoda"])
+def test_nodes_of_a_line_may_be_under_tension_too(solver: str, refused: Refusal) -> None:
+    """Pressures that a line holds between its ticks are treated as states are: warned of, once."""
+    refused.write({"c.yaml": LINE_UNDER_TENSION})
+    code, out, err = refused.run("simulate", "c.yaml", "--quiet", "--json", "--solver", solver)
+    assert (code, err) == (0, "")
+    (warning,) = json.loads(out)["warnings"]
+    assert "below absolute zero" in warning
+
+
 def test_a_circuit_without_states_runs(refused: Refusal) -> None:
     """Nothing to integrate: two rows, and an algebraic flow of 0.7 A sqrt(2 dp / rho) through the orifice."""
     text = SUCKED.replace("line: {type: capacity, volume: 70 cm^3}", "line: {type: tank}")

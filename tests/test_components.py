@@ -167,6 +167,7 @@ def test_power_is_accounted_for() -> None:
     """Every type through which power passes says what becomes of it, but for those that cannot."""
     silent = {name for name, form in FORMS.items() if power_ports(form) and not keeps_books(form)}
     assert silent == {name for name in FORMS if name.startswith(SILENT)}
+    assert [name for name, form in FORMS.items() if keeps_books(form) and not power_ports(form)] == []
 
 
 TYPES = listed(LIBRARY)

@@ -368,3 +368,12 @@ def test_the_manual_lists_every_grade():
     """At three temperatures each, and water."""
     assert {row[0] for row in rows_of_the_manual()} == {*GRADES, "water"}
     assert len(rows_of_the_manual()) == 3 * (len(GRADES) + 1)
+
+
+@pytest.mark.parametrize("air", ["0 %", "10 %"])
+def test_bubbles_do_not_thin_the_oil(air):
+    """mu(p) is the liquid's, mu_0 e^{alpha p}, however much air there is: that of ISO VG 46 at 40 degC by hand."""
+    oil = MineralOil(grade="ISO VG 46", air_fraction=air, pressure_viscosity="2e-8 1/Pa")
+    liquid = MineralOil(grade="ISO VG 46", air_fraction="0 %").density(0.0)
+    for p in (-0.5 * BAR, 0.0, 300 * BAR):
+        assert oil.dynamic_viscosity(p) == pytest.approx(46e-6 * liquid * math.exp(2e-8 * p), rel=1e-9)

@@ -182,10 +182,8 @@ class _CompiledRun:
         if pace is not None:
             r.n_pace = pace[0].size
             r.give(pace_t=_real(pace[0]), pace_s=_real(pace[1]))
-        _, floor, _, tension = self.limits.states
-        floor = floor.copy()
-        floor[self.limits.states[0][np.array(tension, bool)]] = -np.inf  # warned of, not ended
-        r.give(atol=_real(self.atol), floor=_real(floor), held_floor=_real(self.limits.held[1]))
+        floor, held_floor = self.limits.ending  # what lies below is warned of
+        r.give(atol=_real(self.atol), floor=_real(floor), held_floor=_real(held_floor))
 
     def set_scratch(self) -> None:
         r, n = self.run_, self.run_.n
@@ -292,13 +290,15 @@ class _CompiledRun:
     def drain(self) -> None:
         """Take what was recorded, and look whether fluids that may were under tension."""
         block = self.records.drain()
-        if block is None or self.tension or not any(self.limits.states[3]):
+        if block is None or self.tension:
             return
-        below = np.flatnonzero((block["row_x"] < self.limits.states[1]).any(axis=1))
-        if below.size:
-            k = int(below[0])
-            self.tension = self.limits.look(float(block["row_t"][k]), block["row_x"][k], *self.limits.states)
-            self.warnings += [self.tension] if self.tension else []
+        held = block["world_h"][block["row_world"]]
+        for rows, kind in ((block["row_x"], self.limits.states), (held, self.limits.held)):
+            below = np.flatnonzero((rows < kind[1]).any(axis=1)) if any(kind[3]) else np.zeros(0, int)
+            if below.size and not self.tension:
+                k = int(below[0])
+                self.tension = self.limits.look(float(block["row_t"][k]), rows[k], *kind)
+                self.warnings += [self.tension] if self.tension else []
 
     # -- failures --------------------------------------------------------------------------------
 

@@ -38,6 +38,16 @@ class PressureLimits:
         lowest[list(places)] = floors
         return np.array(places, dtype=int), lowest, list(shown), list(tension)
 
+    @property
+    def ending(self) -> tuple[np.ndarray, np.ndarray]:
+        """Lowest values of states and of held values that do not end the run: none where tension is allowed."""
+        found = []
+        for places, floors, _, tension in (self.states, self.held):
+            kept = floors.copy()
+            kept[places[np.array(tension, bool)]] = -np.inf
+            found.append(kept)
+        return found[0], found[1]
+
     def check(self, t: float, x: np.ndarray, h: np.ndarray) -> str | None:
         """A warning, or an error raised; None if all pressures are possible."""
         warning = self.look(t, x, *self.states)
@@ -57,7 +67,8 @@ class PressureLimits:
     ) -> str | None:
         if not np.count_nonzero(vector < floors):
             return None
-        k = int(np.flatnonzero(vector[places] < floors[places])[0])
+        below = np.flatnonzero(vector[places] < floors[places])
+        k = int(next((j for j in below if not tension[j]), below[0]))
         said = (
             f"{names[k]} is {units.pressure.show(vector[places][k], 'bar')} gauge at {t:.6g} s, below absolute zero "
             f"({units.pressure.show(floors[places[k]], 'bar')})"
