@@ -134,12 +134,12 @@ class CavitatingOil(_Evaporating, SimpleOil):
 
     p [Pa] gauge, P = p + P_atm [Pa] absolute; \rho_l = `density` [kg/m^3], \beta_l = `bulk_modulus` [Pa] of the liquid;
     P_v = `vapour_pressure` [Pa], absolute; \rho_v = `vapour_density` [kg/m^3]; \theta [-] share of the volume that
-    vapour takes, 0 above P_v (1 + s) and 1 below P_v (1 - s), s = `vapour_range` [-]; the free air as in
-    `aerated_oil`; \nu = `kinematic_viscosity` [m^2/s] of the liquid, constant. Liquid and vapour are in equilibrium, at one pressure
+    vapour takes, 0 above P_v (1 + s) and 1 below P_v (1 - s), s = `vapour_range` [-]; the free air as in `aerated_oil`;
+    \nu = `kinematic_viscosity` [m^2/s] of the liquid, constant. Liquid and vapour are in equilibrium, at one pressure
     in nature and within the range s here, so that a volume drawn empty and filled again holds the same mass at the same
     pressure; \rho rises with p everywhere and vanishes at absolute zero. The smaller s P_v, the tighter the tolerance
-    of a run must be while oil evaporates. Not for the growth and collapse of bubbles, nor for erosion. Source:
-    Delannoy & Kueny, ASME FED 98 (1990) 153-158; air: Rundo & Corvaglia (2016), section 6.3.
+    of a run must be while oil evaporates. Not for the growth and collapse of bubbles, nor for erosion. Source: Delannoy
+    & Kueny, ASME FED 98 (1990) 153-158; air: Rundo & Corvaglia (2016), section 6.3.
     """
 
     vapour_pressure: Pressure = Field(gt=0, description="absolute pressure at which the liquid evaporates")
