@@ -17,6 +17,7 @@ from crescentlab.causality import Plan
 from crescentlab.component import Component
 from crescentlab.domain import HYDRAULIC, SIGNAL, Held, Observable, State
 from crescentlab.elaborate import Output
+from crescentlab.energy import passes_fluid
 from crescentlab.errors import ExpressionError, InputError, nearest
 from crescentlab.expressions import Value, evaluate
 from crescentlab.prepared import shared
@@ -172,6 +173,7 @@ class _Assembly:
             reading=self.reading,
             _contents=self.contents(),
             _energies=self.energies,
+            _passing=lambda: {n: self.flows(n) for n, c in self.plan.components.items() if passes_fluid(type(c))},
         )
 
     def names(self, kind: type[State] | type[Held]) -> tuple[list[str], list[Quantity]]:

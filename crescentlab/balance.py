@@ -27,9 +27,14 @@ from crescentlab.prepared import LARGE, Prepared, prepare, shared
 from crescentlab.solvers.trajectory import GAUSS_NODES, GAUSS_WEIGHTS, Trajectory
 from crescentlab.symbols import column
 from crescentlab.system import System, Values
+from crescentlab.units import QUANTITIES
 
 Array = np.ndarray
 
+UNEQUAL = 1e-9
+"""Share of the flow through a component that keeps nothing by which entering and leaving may differ: rounding."""
+COLD = 0.01
+"""Share of the power through a component by which its loss may be negative: a fluid's compression and convection."""
 AT_REST = 1e-6
 """Where less than this share of the largest content flows, errors are told as shares of that much."""
 
@@ -40,8 +45,8 @@ class EnergyBalance:
 
     components: dict[str, float]
     circuit: float
-    supplied: float
-    """From outside the circuit, less what left it there."""
+    supplied: dict[str, float]
+    """From outside the circuit, per source or boundary; negative where energy left it there."""
     dissipated: dict[str, float]
     """Turned into heat, per component that did so."""
     stored: float
@@ -71,7 +76,11 @@ class Balance:
     components: dict[str, float]
     circuit: float
     merged: dict[str, float]
+    unequal: dict[str, float]
+    """What entered more than left components that keep nothing [m^3]: their equations are wrong."""
     energy: EnergyBalance | None
+    warnings: list[str]
+    """What is wrong with components, in words."""
 
     def as_json(self) -> dict[str, object]:
         """Plain data for ``--json``."""
@@ -79,24 +88,40 @@ class Balance:
             "circuit": self.circuit,
             "components": self.components,
             "merged": {k: v for k, v in self.merged.items() if v},
+            "unequal": self.unequal,
             "energy": self.energy.as_json() if self.energy else None,
         }
 
 
 def balance(system: System, values: Values, trajectory: Trajectory) -> Balance | None:
     """Compute the ledgers; None if no step was made, or no component keeps books."""
-    contents, energies = system.contents(), system.energies()
+    contents, energies, passing = system.contents(), system.energies(), system.passing()
     if not (contents or energies) or not len(trajectory.pieces.low):
         return None
     content, inflow, flow = (_rows(contents.values(), k) for k in range(3))
-    energy, loss, supply, entering, passing = (_rows(energies.values(), k) for k in range(5))
+    energy, loss, supply, entering, power = (_rows(energies.values(), k) for k in range(5))
     fluid_change, energy_change = _changes(system, values, trajectory, [content, energy])
-    net, size, left, power, lost, supplied = _integrals(
-        system, values, trajectory, [inflow, flow, entering + supply - loss, passing, loss, supply]
-    )
-    books = _kept(system, list(energies), left, np.maximum(power, np.abs(lost)), lost, supplied, energy_change)
+    net, size, left, most, lost, supplied, extra, through = _integrals(
+        system, values, trajectory,
+        [inflow, flow, entering + supply - loss, power, loss, supply, *(_rows(passing.values(), k) for k in range(2))],
+    )  # fmt: skip
+    most = np.maximum(most, np.abs(lost))
+    unequal = {n: float(e) for n, e, q in zip(passing, extra, through, strict=True) if abs(e) > UNEQUAL * q}
+    cold = [name for name, heat, p in zip(energies, lost, most, strict=True) if heat < -COLD * p]
+    books = _kept(system, list(energies), left, most, lost, supplied, energy_change)
     errors = _errors(list(contents), net - fluid_change.smooth, size, fluid_change)
-    return Balance(*errors, _by_name(contents, fluid_change.moved), books)
+    return Balance(*errors, _by_name(contents, fluid_change.moved), unequal, books, _told(unequal, cold))
+
+
+def _told(unequal: dict[str, float], cold: list[str]) -> list[str]:
+    """What the ledgers say against components."""
+    volume = QUANTITIES["volume"]
+    found = [
+        f"{name}: {volume.show(abs(v), 'cm3', 3)} more {'entered than left' if v > 0 else 'left than entered'}; in its "
+        "equations the flows at its ports must add up to 0"
+        for name, v in unequal.items()
+    ]
+    return found + [f"{name}: its loss is negative; check the signs of its flows, forces and torques" for name in cold]
 
 
 def _kept(
@@ -110,7 +135,7 @@ def _kept(
     missing = np.where([name in silent for name in names], 0.0, left - change.smooth)
     errors, circuit = _errors(names, missing, most, change)
     return EnergyBalance(
-        {name: error for name, error in errors.items() if name not in silent}, circuit, float(supplied.sum()),
+        {name: error for name, error in errors.items() if name not in silent}, circuit, _nonzero(names, supplied),
         _nonzero(names, lost), float(change.total.sum()), _nonzero(names, change.at_events), entered,
     )  # fmt: skip
 

@@ -185,7 +185,8 @@ def _fluids(graph: Graph, components: dict[str, Component], library: Library) ->
             elif argument in fluids_asked(type(component)):
                 if not design.fluids:
                     raise InputError(
-                        "the circuit names no fluid; write for example fluid: {type: simple_oil, density: 860 kg/m^3}",
+                        "the circuit names no fluid; write for example fluid: {type: simple_oil, density: 860 kg/m^3, "
+                        "kinematic_viscosity: 35 cSt, bulk_modulus: 14000 bar}",
                         design.instances[name].place,
                     )
                 raise InputError(

@@ -55,6 +55,8 @@ def find(name: str | Path) -> Path:
     known = shipped()
     if str(name) in known:
         return known[str(name)]
+    if path.is_dir():
+        raise InputError(f"{name}: this is a folder; name a circuit file in it, or one of: {', '.join(known)}")
     if path.suffix or len(path.parts) > 1:
         raise InputError(f"{name}: no such file; a circuit is a .yaml file, or one of: {', '.join(known)}")
     raise InputError(f"{name}: no circuit of this name: {nearest(str(name), known)}")
@@ -230,15 +232,16 @@ def check_options(options: Options) -> None:
             f"rtol {options.rtol:g}: the relative tolerance lies between 0 and 1, from 1e-13 on; write for example 1e-6"
         )
     if options.solver not in SOLVERS:
-        raise InputError(f"solver {options.solver!r}: {nearest(options.solver, SOLVERS)}")
+        close = nearest(options.solver, SOLVERS, otherwise="none is called that")
+        raise InputError(f"solver {options.solver!r}: {close} ({', '.join(SOLVERS)})")
     if options.output_step is not None and options.stop / options.output_step > MAX_ROWS:
         raise InputError(f"output_step {options.output_step:g} s makes more than {MAX_ROWS} rows; write a longer one")
+    if options.output_step is not None and options.output_step > options.span:
+        raise InputError(f"output_step {options.output_step:g} s is longer than the run, {options.span:g} s")
 
 
 def _text(value: str | float) -> str:
-    if isinstance(value, str):
-        return value
-    raise InputError(f"parameter value {value!r} has no unit; write text such as '3000 rpm'")
+    return value if isinstance(value, str) else repr(value)
 
 
 def _time(value: str | float | None, name: str, default: Any) -> Any:

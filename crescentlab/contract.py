@@ -68,10 +68,10 @@ def check_component(
             check_jacobian(case)
             if case.stored:
                 check_content(case)
-            if case.keeps_books:
-                check_energy(case)
             if case.restricts:
                 check_restriction(case, backwards)
+            if case.keeps_books:
+                check_energy(case)
             if case.between_bodies:
                 check_reaction(case)
 
@@ -325,7 +325,8 @@ def check_jacobian(case: Case) -> None:
         for i, j in np.argwhere(~np.isfinite(found)):
             told = ", ".join(f"{name} = {np.squeeze(value)}" for name, value in values.items())
             where = "" if one is case else f" for {one.component!r}"
-            raise AssertionError(f"{case.name}: d {rows[i]} / d {columns[j]} is {found[i, j]} at {told}{where}")
+            said = f"{case.name}: d {rows[i]} / d {columns[j]} is {found[i, j]} at {told}{where}"
+            raise AssertionError(f"{said}; round it there, inside the branch if it is in one: both are differentiated")
 
 
 def _at_bounds(case: Case) -> Iterator[Case]:

@@ -19,7 +19,7 @@ from typing import Any
 import casadi as ca
 
 from crescentlab.component import Component, fluid_names
-from crescentlab.domain import CHAMBER, HYDRAULIC, ROTATIONAL, SIGNAL, Observable, Port
+from crescentlab.domain import CHAMBER, HYDRAULIC, ROTATIONAL, SIGNAL, TRANSLATIONAL, Observable, Port
 from crescentlab.fluid import Fluid
 from crescentlab.symbols import Sym, column
 
@@ -37,6 +37,14 @@ def power_ports(cls: type[Component]) -> tuple[Port, ...]:
 def keeps_books(cls: type[Component]) -> bool:
     """Whether the class says what becomes of the power that enters."""
     return cls.lossless or any(o.entry in ENTRIES for o in cls.declared(Observable))
+
+
+@functools.cache
+def passes_fluid(cls: type[Component]) -> bool:
+    """Whether what enters its hydraulic ports must leave by them: it keeps none, displaces none, is no boundary."""
+    ports, entries = power_ports(cls), {o.entry for o in cls.declared(Observable)}
+    moves = any(p.domain in (TRANSLATIONAL, CHAMBER) for p in ports)
+    return sum(p.domain is HYDRAULIC for p in ports) > 1 and not moves and not entries & {"content", "supply"}
 
 
 @functools.cache

@@ -18,6 +18,7 @@ for the user wrote the class.
 from __future__ import annotations
 
 import difflib
+import re
 from collections.abc import Iterable
 from dataclasses import dataclass
 
@@ -82,9 +83,10 @@ class CompilerError(CrescentlabError):
 def nearest(name: str, known: Iterable[str], *, limit: int = 3, otherwise: str = "") -> str:
     """The sentence that offers names like the one received, or says ``otherwise``, or lists what exists."""
     names = sorted(set(known))
+    within = [n for n in names if len(name) > 2 and name.lower() in re.split(r"[_\W]+", n.lower())]
     close = difflib.get_close_matches(name, names, n=limit, cutoff=0.5)
-    if close:
-        return f"did you mean {' or '.join(close)}?"
+    if offered := list(dict.fromkeys([*within[: 2 * limit], *close]))[: max(limit, min(len(within), 2 * limit))]:
+        return f"did you mean {' or '.join(offered)}?"
     if otherwise or not names:
         return otherwise or "there are none"
     shown = ", ".join(names[:12])

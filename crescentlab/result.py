@@ -7,6 +7,7 @@ equations when it is asked for. A file holds what was recorded, and says so.
 from __future__ import annotations
 
 import csv
+import dataclasses
 import functools
 import math
 import re
@@ -81,10 +82,18 @@ class Result:
         for name, part in zip(missing, np.split(values, np.cumsum(sizes)[:-1], axis=1), strict=True):
             self._series[name] = part
 
+    @functools.cached_property
+    def by_steps(self) -> Result:
+        """The same run with a row for each accepted step and event, whatever its output grid."""
+        if self.trajectory.grid is None:
+            return self
+        return Result(self.system, self.values, self.design, dataclasses.replace(self.trajectory, grid=None))
+
     def mean(self, name: str, start: float = 0.0, stop: float = math.inf) -> float:
-        """Mean over time between ``start`` and ``stop`` [s], trapezoidal between rows."""
-        inside = (self.time >= start) & (self.time <= stop)
-        t, y = self.time[inside], self[name][inside]
+        """Mean over time between ``start`` and ``stop`` [s], trapezoidal between the accepted steps."""
+        full = self.by_steps
+        inside = (full.time >= start) & (full.time <= stop)
+        t, y = full.time[inside], full[name][inside]
         if not t.size:
             raise InputError(f"{name}: the run has no rows between {start:g} s and {stop:g} s")
         return float(np.trapezoid(y, t) / (t[-1] - t[0])) if t[-1] > t[0] else float(y[-1])

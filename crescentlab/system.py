@@ -117,6 +117,7 @@ class System:
     """Events -> which of them reads what the component of which other one sets, shape (m, m)."""
     _contents: dict[str, tuple[Callable[[], ca.SX], Callable[[], tuple[ca.SX, ca.SX]]]]
     _energies: Callable[[], dict[str, ca.SX]]
+    _passing: Callable[[], dict[str, tuple[ca.SX, ca.SX]]]
     _functions: dict[Any, ca.Function] = field(default_factory=dict)
     _once: dict[str, Any] = field(default_factory=dict)
     built: dict[tuple[str, str], Prepared] = field(default_factory=dict)
@@ -220,6 +221,10 @@ class System:
     def contents(self) -> dict[str, tuple[ca.SX, ca.SX, ca.SX]]:
         """Per storing component: stored volume, sum of its flows, half the sum of their magnitudes."""
         return {name: (content(), *flows()) for name, (content, flows) in self._contents.items()}
+
+    def passing(self) -> dict[str, tuple[ca.SX, ca.SX]]:
+        """Per component that must pass what enters: sum of its flows, half the sum of their magnitudes."""
+        return self._passing()
 
     def energies(self) -> dict[str, ca.SX]:
         """Per component through which power passes, the five rows of :func:`crescentlab.energy.books`."""

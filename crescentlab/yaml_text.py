@@ -335,4 +335,6 @@ class _Builder:
         hint = ""
         if isinstance(node.value, str) and before and not line[: event.start_mark.column].rstrip().endswith(":"):
             hint = f", or quote text that holds a comma: {before}: '{node.value}, {key}'"
+            if re.fullmatch(r"\s*[+-]?\d+", node.value) and re.match(r"\d", key):
+                hint = f", or decimals follow a point: {before}: {node.value}.{key}"
         raise InputError(f"{key!r} has no value; write {key}: ...{hint}", place)

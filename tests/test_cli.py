@@ -19,10 +19,12 @@ import pytest
 import xarray as xr
 
 import crescentlab as cl
+from crescentlab.circuit import find
 from crescentlab.cli import RUN_KEYS, main
 from crescentlab.commands.components import listed
 from crescentlab.commands.schema import schema
 from crescentlab.component import Component
+from crescentlab.errors import InputError
 from crescentlab.library import installed
 
 FLUID = "{type: simple_oil, density: 860 kg/m^3, kinematic_viscosity: 35 cSt, bulk_modulus: 14000 bar}"
@@ -691,3 +693,51 @@ def test_a_negative_value_is_a_value(capsys: pytest.CaptureFixture[str]) -> None
     assert "--line-error -5%: an error lies between 0 and 200 %" in capsys.readouterr().err
     assert main(["simulate", "relief_valve", "--set", "supply=-3 L/min", "--stop", "-.5ms", "-o", "none"]) == 2
     assert "stop: -.5ms must be above 0" in capsys.readouterr().err
+
+
+def test_the_summary_is_of_the_run_not_of_its_output_grid(capsys: pytest.CaptureFixture[str]) -> None:
+    """Mean, least and largest value of a pressure are those of the steps, however coarse the rows that are written."""
+    fine = run(capsys, "simulate", "relief_valve", "-o", "none")[1]
+    coarse = run(capsys, "simulate", "relief_valve", "-o", "none", "--output-step", "10 ms")[1]
+
+    def figures(said: str) -> list[str]:
+        return next(line for line in said.splitlines() if "p_line.p" in line).split()
+
+    assert figures(coarse) == figures(fine)
+    result = cl.load("relief_valve").simulate(output_step="10 ms")
+    assert result.time.size == 6
+    assert result.mean("line.p") == cl.load("relief_valve").simulate().mean("line.p")
+    assert main(["simulate", "relief_valve", "-o", "none", "--output-step", "1 s"]) == 2
+    assert "output_step 1 s is longer than the run, 0.05 s" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ("command", "told"),
+    [
+        (["components", "pump"], "did you mean fixed_displacement_pump or variable_displacement_pump"),
+        (["components", "cylinder"], "did you mean double_acting_cylinder or single_acting_cylinder"),
+        (["simulate", "."], ".: this is a folder; name a circuit file in it, or one of: accumulator"),
+        (
+            ["simulate", "relief_valve", "--solver", "ode45"],
+            "(auto, lsoda, bdf, radau, rk45, ",
+        ),
+    ],
+)
+def test_a_stranger_is_told_what_there_is(command: list[str], told: str, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(command) == 2
+    assert told in capsys.readouterr().err
+
+
+def test_numbers_without_unit_may_be_numbers() -> None:
+    """From Python a ratio is a number; a pressure without its unit is refused as it is in text."""
+    supply = cl.load("relief_valve").simulate(parameters={"valve.jet_coefficient": 0})
+    assert supply["valve.holes.jet_force"].max() == 0
+    with pytest.raises(InputError, match="needs a unit"):
+        cl.load("relief_valve").simulate(parameters={"supply": 30.0})
+
+
+def test_a_decimal_comma_is_seen(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    text = (Path(find("relief_valve"))).read_text(encoding="utf-8").replace("volume: 70 cm^3", "volume: 70,5 cm^3")
+    (tmp_path / "c.yaml").write_text(text, encoding="utf-8")
+    assert main(["check", str(tmp_path / "c.yaml")]) == 2
+    assert "decimals follow a point: volume: 70.5 cm^3" in capsys.readouterr().err

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+import re
 import textwrap
 from pathlib import Path
 
@@ -41,9 +42,11 @@ def energy(result: cl.Result) -> EnergyBalance:
 
 def closes(books: EnergyBalance, share: float, exchanged: float = 0.0) -> bool:
     """Whether every component and the circuit close, and the totals with them; ``exchanged`` [J] stayed inside."""
-    missing = books.supplied - sum(books.dissipated.values()) - books.stored + sum(books.at_events.values())
+    missing = (
+        sum(books.supplied.values()) - sum(books.dissipated.values()) - books.stored + sum(books.at_events.values())
+    )
     missing -= sum(books.silent.values())
-    size = max(exchanged, abs(books.supplied), sum(books.dissipated.values()), abs(books.stored))
+    size = max(exchanged, abs(sum(books.supplied.values())), sum(books.dissipated.values()), abs(books.stored))
     return max(books.circuit, *books.components.values()) < share and abs(missing) < 10 * share * size
 
 
@@ -64,7 +67,7 @@ def test_two_volumes_lose_what_they_no_longer_hold(tmp_path: Path) -> None:
     assert run["one.p"][-1] == pytest.approx(level, rel=1e-6)
     assert books.dissipated == {"hole": pytest.approx(lost, rel=1e-6)}
     assert books.stored == pytest.approx(-lost, rel=1e-6)
-    assert books.supplied == 0
+    assert books.supplied == {}
     assert closes(books, 1e-6)
 
 
@@ -180,11 +183,16 @@ def test_the_summary_and_json_show_the_energy(capsys: pytest.CaptureFixture[str]
     """What a user sees of a relief valve: all that is supplied becomes heat, but for what the line now holds."""
     assert main(["simulate", "relief_valve", "-o", "none"]) == 0
     said = capsys.readouterr().out
-    assert all(word in said for word in ("supplied", "to heat", "stored", "of the power"))
+    page = (Path(__file__).parents[1] / "docs" / "balances.md").read_text(encoding="utf-8")
+    shown = [line for line in page.splitlines() if line.startswith(("  energy ", "  heat "))]
+    assert len(shown) == 2
+    assert all(line in said for line in shown)
     assert main(["simulate", "relief_valve", "-o", "none", "--json"]) == 0
     found = json.loads(capsys.readouterr().out)["balance"]["energy"]
     assert set(found) == {"circuit", "components", "supplied", "dissipated", "stored", "at_events", "silent"}
-    assert found["supplied"] == pytest.approx(sum(found["dissipated"].values()) + found["stored"], rel=1e-6)
+    assert sum(found["supplied"].values()) == pytest.approx(
+        sum(found["dissipated"].values()) + found["stored"], rel=1e-6
+    )
 
 
 def test_losses_are_variables_like_others() -> None:
@@ -213,3 +221,63 @@ def test_a_store_that_does_not_say_what_it_loses_is_refused() -> None:
 
     with pytest.raises(ComponentError, match="does not return loss"):
         check_returned(Sloppy, Sloppy().equations(0.0, 1.0, 0.0))
+
+
+WRONG = '''
+from pydantic import Field
+from crescentlab.component import Component, Equations
+from crescentlab.domain import dissipates, takes_pressure
+from crescentlab.units import FlowConductance
+
+class Leak(Component):
+    """Leak q = G (p_a - p_b)."""
+    conductance: FlowConductance = Field(description="flow per pressure drop")
+    a = takes_pressure("upstream")
+    b = takes_pressure("downstream")
+    loss = dissipates()
+    def equations(self, p_a, p_b) -> Equations:
+        q = self.conductance * (p_a - p_b)
+        return {"q_a": q, "q_b": -SHARE * q}
+'''
+
+
+@pytest.mark.parametrize(
+    ("share", "conductance", "told"),
+    [
+        (
+            "0.5",
+            "1e-12",
+            r"hole: .* cm3 more entered than left; in its equations the flows at its ports must add up to 0",
+        ),
+        ("1", "-1e-12", "hole: its loss is negative; check the signs of its flows, forces and torques"),
+    ],
+)
+def test_a_component_that_makes_fluid_or_energy_is_warned_of(
+    share: str, conductance: str, told: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Half of what enters vanishes; or everything flows uphill. The volumes' own ledgers close all the same."""
+    (tmp_path / "mine.py").write_text(WRONG.replace("SHARE", share), encoding="utf-8")
+    bench = circuit(tmp_path, f"""
+        fluid: {OIL}
+        library: [./mine.py]
+        components:
+          one: {{type: capacity, volume: 70 cm^3, start: {{p: 50 bar}}}}
+          hole: {{type: leak, conductance: {conductance} m^3/(s Pa)}}
+          other: {{type: capacity, volume: 70 cm^3}}
+        nets: {{high: [one.port, hole.a], low: [hole.b, other.port]}}
+        simulation: {{stop: 0.5 ms}}
+        """)  # fmt: skip
+    balance = bench.simulate().balance
+    assert balance is not None
+    assert max(balance.components.values()) < 1e-3
+    (warning,) = balance.warnings
+    assert re.match(told, warning)
+    assert main(["simulate", str(tmp_path / "bench.yaml"), "-o", "none"]) == 0
+    assert f"warning: {warning}" in capsys.readouterr().out
+
+
+def test_what_drives_and_what_brakes_are_told_apart() -> None:
+    """A pump's drive supplies, a weight that is lifted takes out; each stands under its own name."""
+    books = energy(cl.load("hydrostatic_transmission").simulate())
+    assert {name for name, joules in books.supplied.items() if joules > 0} == {"engine"}
+    assert all(joules < 0 for name, joules in books.supplied.items() if name != "engine")

@@ -65,7 +65,9 @@ def test_returned_oil_brings_its_height() -> None:
     assert energy is not None
     mean = 0.3  # of a level that falls evenly from 0.4 to 0.2 m
     assert energy.stored == pytest.approx(860 * G * 0.01 / 2 * (0.2**2 - 0.4**2), rel=1e-5)
-    brought = energy.supplied + 860 * G * mean * 6e-3  # the flow sources supply too: -p q at the outlet, 0 above
+    brought = (
+        sum(energy.supplied.values()) + 860 * G * mean * 6e-3
+    )  # the flow sources supply too: -p q at the outlet, 0 above
     assert brought == pytest.approx(860 * G * mean * 4e-3, rel=1e-5)
     assert max(energy.components.values()) < 1e-9
 

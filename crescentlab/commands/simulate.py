@@ -12,6 +12,8 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from crescentlab import plotting
 from crescentlab.balance import Balance
 from crescentlab.circuit import Circuit, load
@@ -26,6 +28,8 @@ log = logging.getLogger("crescentlab")
 EXIT_CODES = {"done": DONE, "stopped": DONE, "failed": FAILED, "interrupted": INTERRUPTED}
 MAX_NETS = 12
 """Most net pressures listed in the summary."""
+ROUNDING = 1e-12
+"""Numbers of the summary below this share of their series' largest are zero."""
 MAX_HOT = 4
 """Most components listed that turn energy into heat."""
 
@@ -113,9 +117,14 @@ def report(result: Result, target: Path | None) -> dict[str, Any]:
         "status": t.status, "final_time": float(t.steps.t[-1]), "wall_s": s.wall_s, "steps": s.steps,
         "evaluations": s.evaluations, "jacobians": s.jacobians, "events": s.events, "ticks": s.ticks,
         "restarts": s.restarts, "states": len(result.system.state_names),
-        "balance": balance.as_json() if balance else None, "warnings": list(t.warnings),
+        "balance": balance.as_json() if balance else None, "warnings": warnings(result),
         "file": str(target) if target else None, "error": t.error or None,
     }  # fmt: skip
+
+
+def warnings(result: Result) -> list[str]:
+    """What the run and its ledgers warn of."""
+    return [*result.trajectory.warnings, *(result.balance.warnings if result.balance else [])]
 
 
 def finite(value: Any) -> Any:
@@ -134,7 +143,7 @@ def summary(result: Result, target: Path | None, record: list[str], pictures: li
         more = len(result.net_pressures()) - MAX_NETS
         said = f"\n  and {counted(more, 'net')} more" if more > 0 else ""
         parts.append(table(rows, right=(2, 3, 4, 5), indent="  ") + said)
-    parts += [f"  warning: {warning}" for warning in result.trajectory.warnings]
+    parts += [f"  warning: {warning}" for warning in warnings(result)]
     written = [f"  wrote {path}" for path in pictures]
     if target is not None:
         names = counted(len(result.chosen(record)), "variable")
@@ -175,8 +184,9 @@ def _ledgers(balance: Balance) -> Iterator[tuple[str, str]]:
         yield "merged", f"{QUANTITIES['volume'].show(merged, 'cm3', 3)} moved by events"
     if energy is None:
         return
-    amounts = [(energy.supplied, "supplied"), (sum(energy.dissipated.values()), "to heat"), (energy.stored, "stored")]
-    said = [f"{_joules(amount)} {where}" for amount, where in amounts]
+    given, taken = (sum(e for e in energy.supplied.values() if (e > 0) == way) for way in (True, False))
+    said = [f"{_joules(given)} supplied", f"{_joules(-taken)} taken out"] if taken else [f"{_joules(given)} supplied"]
+    said += [f"{_joules(sum(energy.dissipated.values()))} to heat", f"{_joules(energy.stored)} stored"]
     if lost := sum(energy.at_events.values()):
         said.append(f"of it {_joules(lost)} at events")
     if energy.silent:
@@ -195,7 +205,8 @@ def _joules(amount: float) -> str:
 
 
 def figures(result: Result) -> list[tuple[str, ...]]:
-    """Outputs and net pressures: unit, last value, mean, least, largest."""
+    """Outputs and net pressures: unit, last value, mean, least, largest; of the steps, not of the output grid."""
+    result = result.by_steps
     names = [o.name for o in result.design.outputs if o.scope == ""] + result.net_pressures()[:MAX_NETS]
     columns = [n for name in names for n in result.elements(name)]
     result.load(names)
@@ -203,7 +214,8 @@ def figures(result: Result) -> list[tuple[str, ...]]:
     for name in columns:
         quantity, series = result.quantity(name), result[name]
         unit = result.display_unit(quantity)
-        numbers = (series[-1], result.mean(name), series.min(), series.max())
+        numbers = np.array([series[-1], result.mean(name), series.min(), series.max()])
+        numbers[np.abs(numbers) < ROUNDING * max(np.abs(series).max(), ROUNDING * quantity.nominal)] = 0.0
         rows.append((name, "" if unit == "1" else unit, *[_scaled(quantity.show(float(v), unit)) for v in numbers]))
     return rows
 

@@ -118,7 +118,7 @@ def given_back() -> list[Number]:
         )
         assert run.balance is not None
         assert run.balance.energy is not None
-        work.append(run.balance.energy.supplied)
+        work.append(sum(run.balance.energy.supplied.values()))
     beta, low = 1.4e9, 90 * BAR + ATM
 
     def oil(p: float) -> float:

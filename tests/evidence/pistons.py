@@ -83,6 +83,6 @@ def squeezed() -> list[Number]:
     p = 1.4e9 * math.log(1e-4 / left)
     work = left * (1.4e9 * math.expm1(p / 1.4e9) - p)
     return [
-        Number("work of the rod", work, run.balance.energy.supplied, "J"),
+        Number("work of the rod", work, sum(run.balance.energy.supplied.values()), "J"),
         Number("energy of the oil", work, float(run["oil.stored_energy"][-1]), "J"),
     ]

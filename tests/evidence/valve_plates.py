@@ -185,7 +185,7 @@ def work_of_the_actuator() -> list[Number]:
     for k in range(3):
         volume = 20e-6 + half + half * (1 - math.exp(-20.0)) * math.cos(0.4 * math.pi - 2 * math.pi / 3 * k)
         stored += volume * compressed(400 * BAR - 1.4e9 * math.log(volume / (20e-6 + half)))
-    return [Number("work", stored, run.balance.energy.supplied, "mJ")]
+    return [Number("work", stored, sum(run.balance.energy.supplied.values()), "mJ")]
 
 
 @evidence(
