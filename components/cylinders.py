@@ -38,7 +38,10 @@ from .mechanics import contact_force
 SMALLEST_SHARE = 1e-3
 """Share of the dead volume that a used-up chamber keeps, so that what divides by it stays finite."""
 
-USED_UP = "the piston has gone through its stop and used up a dead volume; raise stop_stiffness or dead volumes"
+USED_UP = (
+    "the piston has gone through its stop and used up a dead volume; start it within its stroke, or raise "
+    "stop_stiffness or dead volumes"
+)
 
 
 def _stops(x: Any, v: Any, stroke: Any, stiffness: Any, restitution: Any, impact_velocity: Any) -> tuple[Any, Any, Any]:
