@@ -23,6 +23,7 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
+from crescentlab.columns import evaluate
 from crescentlab.prepared import LARGE, Prepared, prepare, shared
 from crescentlab.solvers.trajectory import GAUSS_NODES, GAUSS_WEIGHTS, Trajectory
 from crescentlab.symbols import column
@@ -165,11 +166,9 @@ class _Change:
 
 def _changes(system: System, values: Values, trajectory: Trajectory, stored: list[ca.SX]) -> list[_Change]:
     t, x, h, b = trajectory.steps.arrays()
-    prepared = _prepared(system, stored)
-    q = prepared.parameters(values.p)
     at = trajectory.steps.jumps
     found: list[_Change] = []
-    for amounts in map(np.array, prepared.function(t.reshape(1, -1), x.T, h.T, b.T, q)):
+    for amounts in evaluate(_prepared(system, stored), (t.reshape(1, -1), x.T, h.T, b.T), values.p):
         jumps = amounts[:, at] - amounts[:, at - 1]
         total, largest = amounts[:, -1] - amounts[:, 0], np.abs(amounts).max(axis=1)
         found.append(_Change(total, jumps.sum(axis=1), np.abs(jumps).sum(axis=1), largest))
@@ -179,7 +178,6 @@ def _changes(system: System, values: Values, trajectory: Trajectory, stored: lis
 def _integrals(system: System, values: Values, trajectory: Trajectory, rates: list[ca.SX]) -> list[Array]:
     """Integrals of ``rates`` over the run."""
     prepared = _prepared(system, rates)
-    q = prepared.parameters(values.p)
     pieces = trajectory.pieces
     low, high = np.array(pieces.low), np.array(pieces.high)
     h, b = np.array(pieces.h).T, np.array(pieces.b).T
@@ -188,8 +186,8 @@ def _integrals(system: System, values: Values, trajectory: Trajectory, rates: li
     for node, weight in enumerate(GAUSS_WEIGHTS):
         # relations that compare time read it from frozen bits, so the node's own time serves signals
         t = low + (high - low) * GAUSS_NODES[node]
-        now = prepared.function(t.reshape(1, -1), x[:, node, :].T, h, b, q)
-        found = [sum_ + np.array(rate) @ (weight * (high - low)) for sum_, rate in zip(found, now, strict=True)]
+        now = evaluate(prepared, (t.reshape(1, -1), x[:, node, :].T, h, b), values.p)
+        found = [sum_ + rate @ (weight * (high - low)) for sum_, rate in zip(found, now, strict=True)]
     return found
 
 
@@ -197,7 +195,7 @@ def _prepared(system: System, columns: list[ca.SX]) -> Prepared:
     """The columns as a function; pressures of a net are one symbol, so that what its ports carry is found once."""
     whole = shared(ca.densify(column(columns)), LARGE)
     parts = ca.vertsplit(whole, [0, *np.cumsum([each.numel() for each in columns]).tolist()])
-    return prepare("ledger", system.arguments[:-1], system.p, parts)
+    return prepare("ledger", system.arguments[:-1], system.p, parts, seldom=True)
 
 
 def _errors(names: list[str], missing: Array, passing: Array, change: _Change) -> tuple[dict[str, float], float]:

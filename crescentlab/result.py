@@ -77,8 +77,7 @@ class Result:
             return
         sizes = [len(self.system.find(n).expression()) for n in missing]
         t, x, h, b = self._rows
-        columns = self.system.function_of(missing)(t.reshape(1, -1), x.T, h.T, b.T, self.values.p)
-        values = np.array(columns).T.reshape(t.size, -1)
+        values = self.system.series(missing, t, x, h, b, self.values.p).T
         for name, part in zip(missing, np.split(values, np.cumsum(sizes)[:-1], axis=1), strict=True):
             self._series[name] = part
 

@@ -18,6 +18,7 @@ import casadi as ca
 import numpy as np
 
 from crescentlab.causality import Plan
+from crescentlab.columns import evaluate
 from crescentlab.component import Component
 from crescentlab.domain import Held, State
 from crescentlab.elaborate import Design
@@ -119,7 +120,7 @@ class System:
     _energies: Callable[[], dict[str, ca.SX]]
     _passing: Callable[[], dict[str, tuple[ca.SX, ca.SX]]]
     _functions: dict[Any, ca.Function] = field(default_factory=dict)
-    _once: dict[str, Any] = field(default_factory=dict)
+    _once: dict[Any, Any] = field(default_factory=dict)
     built: dict[tuple[str, str], Prepared] = field(default_factory=dict)
     """Functions that have been compiled, by name and form (see :mod:`crescentlab.solvers.promotion`)."""
 
@@ -217,6 +218,15 @@ class System:
             elements = [e for name in names for e in self.find(name).expression()]
             self._functions[key] = ca.Function("v", self.arguments, [shared(ca.densify(column(elements)), LARGE)])
         return self._functions[key]
+
+    def series(self, names: Sequence[str], t: Array, x: Array, h: Array, b: Array, p: Array) -> Array:
+        """The named variables' elements one after another at times (m,), states (m, n) and so on: (elements, m)."""
+        key = ("series", *names)
+        if key not in self._once:
+            elements = [e for name in names for e in self.find(name).expression()]
+            whole = shared(ca.densify(column(elements)), LARGE)
+            self._once[key] = prepare("series", self.arguments[:-1], self.p, [whole], seldom=True)
+        return evaluate(self._once[key], (t.reshape(1, -1), x.T, h.T, b.T), p)[0]
 
     def contents(self) -> dict[str, tuple[ca.SX, ca.SX, ca.SX]]:
         """Per storing component: stored volume, sum of its flows, half the sum of their magnitudes."""

@@ -84,8 +84,8 @@ class Window:
             return
         variables = [self.system.find(name) for name in missing]
         sizes = np.cumsum([len(variable.expression()) for variable in variables])[:-1]
-        rows = self.system.function_of(missing)(self.t.reshape(1, -1), self.x.T, self.h.T, self.b.T, self.p)
-        for name, variable, part in zip(missing, variables, np.split(np.array(rows), sizes), strict=True):
+        rows = self.system.series(missing, self.t, self.x, self.h, self.b, self.p)
+        for name, variable, part in zip(missing, variables, np.split(rows, sizes), strict=True):
             self.series[name] = part.T if variable.vector else part.ravel()
 
     def whole_periods(self, frequency: float) -> None:

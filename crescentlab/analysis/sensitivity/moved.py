@@ -198,8 +198,7 @@ class Moving:
 def together(window: Window, names: list[str]) -> dict[str, Array]:
     """Series of several variables over a window, evaluated at once: they share most of their equations."""
     system = window.system
-    arguments = (window.t.reshape(1, -1), window.x.T, window.h.T, window.b.T, window.p)
-    columns = system.function_of(names)(*arguments).full().T
+    columns = system.series(names, window.t, window.x, window.h, window.b, window.p).T
     sizes = [len(system.find(name).expression()) for name in names]
     parts = np.split(columns, np.cumsum(sizes)[:-1], axis=1) if names else []
     return {
