@@ -103,8 +103,8 @@ class ElasticShaft(Component):
 
     \vartheta [rad] twist, a state of its own, so that the rotors' angles may be counted on for ever; \omega [rad/s];
     T [N m] torque that a gives to b; c = `stiffness` [N m/rad]; d = `damping` [N m s/rad]. For a round bar
-    c = G \pi d^4/(32 l). Not for backlash. Source: Hooke's law in torsion with Kelvin-Voigt damping; J. P. Den Hartog,
-    Mechanical Vibrations (1956), torsional vibration.
+    c = G \pi d^4/(32 l). Not for play (`backlash`). Source: Hooke's law in torsion with Kelvin-Voigt damping; J. P. Den
+    Hartog, Mechanical Vibrations (1956), torsional vibration.
     """
 
     stiffness: RotaryStiffness = Field(gt=0, description="torque per twist")

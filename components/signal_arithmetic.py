@@ -103,7 +103,7 @@ class Limiter(Inferring, Component):
     .. math:: y = \min(\max(u, y_{low}), y_{high})
 
     u, y, y_low = `low`, y_high = `high`, in the SI unit of `output_quantity` [1 by default]. Each limit is an event.
-    Not for a limited rate of change. Source: definition of saturation.
+    Not for a limited rate of change (`rate_limiter`). Source: definition of saturation.
     """
 
     inferred: ClassVar[dict[str, tuple[str, ...]]] = {"output_quantity": ("high", "low")}
@@ -148,9 +148,10 @@ class DeadBand(Inferring, Component):
 
 def limited(value: Any, low: Any, high: Any) -> Any:
     """`value` between `low` and `high`, None for no limit; each limit is an event."""
+    given = value  # both look at what is given, so that neither depends on the other's bit
     if low is not None:
-        value = event_where(value < low, low, value)
-    return value if high is None else event_where(value > high, high, value)
+        value = event_where(given < low, low, value)
+    return value if high is None else event_where(given > high, high, value)
 
 
 def limits_in_order(quantity: str, low: float | None, high: float | None) -> None:

@@ -42,6 +42,11 @@ class _Rubbing(BaseModel):
             "loss": -friction * v,
         }
 
+    def _comes_to_rest(self, up: Any, down: Any, v: Any, force: Any) -> Any:
+        """Whether v crosses zero against the way it slides; with F_s = F_c rounding alone would, as it breaks away."""
+        F_s = self.static_friction
+        return up & (v < 0) & not_(force > F_s) | down & (v > 0) & not_(force < -F_s)
+
     def _onward(self, force: Any) -> Any:
         """Where a mass that comes to rest slides on to: 1 up, -1 down, 0 it sticks."""
         return where(force > self.static_friction, 1.0, where(force < -self.static_friction, -1.0, 0.0))
@@ -73,7 +78,7 @@ class StickSlipMass(_Rubbing, Component):
         up, down, sticks = direction == 1, direction == -1, direction == 0
         return {
             **self._law(x, v, up | down, direction, f_port),
-            "stops": when(up & (v < 0) | down & (v > 0), v=0.0, direction=self._onward(f_port)),
+            "stops": when(self._comes_to_rest(up, down, v, f_port), v=0.0, direction=self._onward(f_port)),
             "breaks_away_up": when(sticks & (f_port > self.static_friction), direction=1.0),
             "breaks_away_down": when(sticks & (f_port < -self.static_friction), direction=-1.0),
             "starts": when(direction == 2, direction=where(v > 0, 1.0, where(v < 0, -1.0, 0.0))),
@@ -135,7 +140,7 @@ class StickSlipMassWithStops(_Rubbing, Component):
                 up & (x > self.high), x=self.high, v=where(fast, rebound, 0.0), direction=where(fast, -1.0, 0.0),
                 at=where(fast, 0.0, 1.0),
             ),
-            "stops": when(up & (v < 0) | down & (v > 0), v=0.0, direction=self._onward(f_port)),
+            "stops": when(self._comes_to_rest(up, down, v, f_port), v=0.0, direction=self._onward(f_port)),
             "breaks_away_up": when(sticks & not_(at == 1) & (f_port > self.static_friction), direction=1.0, at=0.0),
             "breaks_away_down": when(
                 sticks & not_(at == -1) & (f_port < -self.static_friction), direction=-1.0, at=0.0

@@ -76,6 +76,7 @@ SETTINGS: dict[str, dict[str, object]] = {
     "transfer_function": {"numerator": [2.0, 1.0], "denominator": [3.0, 2.0, 1.0]},
     **{key: {"integral_time": 0.3, "derivative_time": 0.1, "low": -1.0, "high": 0.5} for key in ("pid", "sampled_pid")},
     "crank": {"rod_length": 3e-3},
+    "relay": {"upper": 0.5, "lower": -0.5},
     "external_gears": {"module": 1e-3, "dedendum": 1.25e-3},
     "pulse": {"period": 1.0, "width": 0.5},
     "axial_face_gap": {"inner_diameter": 10e-3, "outer_diameter": 20e-3},
@@ -99,13 +100,15 @@ WITHIN: dict[str, dict[str, tuple[float, float]]] = {
     "mass_with_stops": {"at": (0.0, 0.0)},
     "stick_slip_mass": {"direction": (1.0, 1.0), "v": (0.0, 1e-2)},
     "stick_slip_mass_with_stops": {"direction": (1.0, 1.0), "v": (0.0, 1e-2)},
+    "stick_slip_inertia": {"direction": (1.0, 1.0), "omega": (0.0, 1.0)},
+    "friction_brake": {"direction": (1.0, 1.0), "omega": (0.0, 1.0)},
     "piston_separator": {"pressure_a": (2e5, 2e5), "pressure_b": (2e5, 2e5)},
     "trapped_volume": {"exists": (1.0, 1.0)},
 }
 """Where the ledger of energy holds.
 
-A mass that rests does not move, and slides the way it goes; a piston between two fluids that is free has one pressure
-on both sides; a volume that does not exist does not grow.
+A mass or rotor that rests does not move, and slides the way it goes; a piston between two fluids that is free has one
+pressure on both sides; a volume that does not exist does not grow.
 """
 
 

@@ -332,3 +332,21 @@ def test_a_mass_in_even_motion_between_its_stops_is_left_alone(solver):
     v, lag = 50 / 400, 2 / 400
     assert run["mass.x"][-1] == pytest.approx(v * 1.0 - v * lag, rel=1e-6)
     assert run.trajectory.statistics.events == 1  # its start
+
+
+@pytest.mark.parametrize("solver", ["lsoda", "rodas"])
+@pytest.mark.parametrize("kind", ["stick_slip_mass", "stick_slip_mass_with_stops"])
+def test_equal_frictions_break_away_under_an_elastic_drive(kind, solver):
+    """With F_s = F_c the force at break-away equals the friction to rounding, which must not stop the mass at once."""
+    stops = {"low": "-1 m", "high": "1 m"} if kind.endswith("stops") else {}
+    rubbing = {"mass": "0.1 g", "coulomb_friction": "0.1 N", "static_friction": "0.1 N", "start": {"x": "0 m"}}
+    parts = {
+        "drive": {"type": "mass", "mass": "1 kg", "start": {"v": "0.5 m/s"}},
+        "back": {"type": "spring", "stiffness": "3 N/m"},
+        "spring": {"type": "spring_between", "stiffness": "5000 N/m"},
+        "mass": {"type": kind, **rubbing, **stops},
+    }
+    nets = {"d": ["drive.port", "back.rod", "spring.a"], "m": ["spring.b", "mass.port"]}
+    run = circuit(components=parts, nets=nets, simulation={"stop": "13 s"}).simulate(solver=solver)
+    assert run.trajectory.status == "done"
+    assert abs(run["mass.x"][-1] - run["drive.x"][-1]) < 1.01 * 0.1 / 5000
