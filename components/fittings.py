@@ -77,21 +77,25 @@ def bend_loss(curvature: Any, angle: Any) -> Any:
 class Bend(Component):
     r"""Smooth bend of a round pipe: the friction along its axis and the loss by its curvature.
 
-    .. math:: p_a - p_b = \left(f \frac{R \delta}{d} + A_1 B_1\right) \frac{\rho v |v|}{2}, \quad
+    .. math:: p_a - p_b = \left(f \frac{R \delta}{d} + A_1 B_1 + \frac{K_1}{Re}\right) \frac{\rho v |v|}{2}, \quad
               B_1 = 0.21\, (R/d)^{-5/2} \ (R < d), \quad B_1 = 0.21\, (R/d)^{-1/2} \ (R \ge d)
 
     p [Pa] gauge, total; d = `diameter`, R = `radius` of the axis [m]; \delta = `angle` [rad]; A_1 [-] is 0.9 sin \delta
     up to 70 degrees, 1 at 90, 0.7 + 0.35 \delta/90 from 100 degrees on; f [-] Darcy factor of Churchill with
-    `roughness`; v [m/s], \rho [kg/m^3], \nu [m^2/s] as in `pipe_resistance`. For R/d from 0.5 on, ten diameters of
-    straight pipe ahead of the bend, and Re from 300 000 on. Below, the diagram's A_1 B_1 grows, to twice at 10 000, and
-    has 600/Re to 6000/Re more in laminar flow: that is left out. Not for square corners (`elbow`).
-    Source: I. E. Idelchik, Handbook of Hydraulic Resistance, diagram 6-1; S. W. Churchill (1977).
+    `roughness`; K_1 = `laminar_coefficient` [-]; v [m/s], \rho [kg/m^3], \nu [m^2/s] as in `pipe_resistance`; Re =
+    |v| d/\nu [-]. K_1 is by default Hooper's for 90 degrees with R/d of 1 and 1.5; he has 500 for 45 degrees, 1000 for
+    180. Idelchik has 600 for R/d above 2, 1000 from 1 to 2, 4000 to 2000 from 0.7 to 1, 6000 from 0.55 to 0.7, 4000
+    below, at any angle. For R/d from 0.5 on and ten diameters of straight pipe ahead of the bend. Between Re = 6500 and
+    300 000 the diagram has up to half as much again as A_1 B_1 + K_1/Re, most at 20 000. Not for square corners
+    (`elbow`). Source: I. E. Idelchik, Handbook of Hydraulic Resistance, diagram 6-1; W. B. Hooper, Chem. Eng. 88 (1981)
+    17, 96-100; S. W. Churchill (1977).
     """
 
     diameter: Length = Field(gt=0, description="inner diameter")
     radius: Length = Field(gt=0, description="radius of the pipe's axis")
     angle: Angle = Field(default=pi / 2, gt=0, le=pi, description="by which the flow is turned")
     roughness: Length = Field(default=0.0, ge=0, description="height of the wall's roughness; 0 is smooth")
+    laminar_coefficient: Ratio = Field(default=800.0, ge=0, description="coefficient times Reynolds number at small Re")
 
     a = takes_pressure("first end")
     b = takes_pressure("second end")
@@ -109,7 +113,7 @@ class Bend(Component):
 
     def equations(self, p_a: Expr, p_b: Expr, fluid: Fluid) -> Equations:
         length, loss = self.radius * self.angle, bend_loss(self.radius / self.diameter, self.angle)
-        q = pipe_friction_flow(p_a, p_b, length, self.diameter, self.roughness, fluid, loss)
+        q = pipe_friction_flow(p_a, p_b, length, self.diameter, self.roughness, fluid, loss, self.laminar_coefficient)
         return {"q_a": q, "q_b": -q, "q": q}
 
 

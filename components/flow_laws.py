@@ -195,46 +195,53 @@ def local_loss_velocity(p_a: Any, p_b: Any, diameter: Any, loss: Any, laminar: A
 
 
 def pipe_friction_flow(
-    p_a: Any, p_b: Any, length: Any, diameter: Any, roughness: Any, fluid: Fluid, loss_coefficient: Any = 0.0
+    p_a: Any, p_b: Any, length: Any, diameter: Any, roughness: Any, fluid: Fluid, loss_coefficient: Any = 0.0,
+    laminar_coefficient: Any = 0.0,
 ) -> Any:  # fmt: skip
     r"""Flow [m^3/s] from a to b through a round pipe at a given drop: :func:`pipe_friction_drop` solved for q.
 
-    .. math:: \Delta p = \left(f \frac{l}{d} + K\right) \frac{\rho v |v|}{2}
-              \quad\Leftrightarrow\quad f Re^2 + K \frac{d}{l} Re^2 = \frac{2 |\Delta p| d^3}{\rho \nu^2 l}
+    .. math:: \Delta p = \left(f \frac{l}{d} + K + \frac{K_1}{Re}\right) \frac{\rho v |v|}{2}
+              \quad\Leftrightarrow\quad f Re^2 + \frac{d}{l} (K Re^2 + K_1 Re) = \frac{2 |\Delta p| d^3}{\rho \nu^2 l}
 
-    Symbols as there, density and viscosity at the mean pressure. Newton's method on the logarithms, in which the law
-    rises with a slope between 1 and 4, from the laminar or from Colebrook's explicit answer; exact to rounding.
+    Symbols as there, K_1 = `laminar_coefficient` [-], density and viscosity at the mean pressure. Newton's method on
+    the logarithms, in which the law rises with a slope between 1 and 4, from the laminar or from Colebrook's explicit
+    answer; exact to rounding.
     Source: Darcy-Weisbach with Churchill (1977).
     """
     mean: Any = (p_a + p_b) / 2
     drop = p_a - p_b
     rho, nu = fluid.density(mean), fluid.kinematic_viscosity(mean)
     known = 2 * fabs(drop) * diameter**3 / (rho * nu * nu * length)
-    per_reynolds = _resistance_at(known, roughness / diameter, loss_coefficient * diameter / length)
+    per_length = diameter / length
+    per_reynolds = _resistance_at(
+        known, roughness / diameter, loss_coefficient * per_length, laminar_coefficient * per_length
+    )
     v = drop * 2 * diameter * diameter / (rho * nu * length * per_reynolds)
     return pi / 4 * diameter * diameter * v * rho / fluid.rho_0
 
 
-def _resistance_at(known: Any, relative_roughness: Any, local: Any) -> Any:
-    """f Re + local Re [-] where times Re it is `known`."""
-    target = maximum(known, 64 + local)  # Re = 1, below which f Re is 64 to 1e-100
+def _resistance_at(known: Any, relative_roughness: Any, local: Any, laminar: Any) -> Any:
+    """f Re + local Re + laminar [-] where times Re it is `known`."""
+    creeping = 64 + laminar
+    target = maximum(known, creeping + local)  # Re = 1, below which f Re is 64 to 1e-100
     root = sqrt(target)
-    laminar = target / _laminar_resistance_at(target, local)
+    slow = target / _laminar_resistance_at(target, local, creeping)
     colebrook = -2 / log(10.0) * root * log(relative_roughness / 3.7 + 2.51 / root)
-    turbulent = colebrook / sqrt(1 + local * colebrook * colebrook / target)
-    re = where(laminar < _CRITICAL, laminar, maximum(turbulent, _CRITICAL))
+    fast = 2 * target / (laminar + sqrt(laminar * laminar + 4 * target * (target / (colebrook * colebrook) + local)))
+    re = where(slow < _CRITICAL, slow, maximum(fast, _CRITICAL))
     for _ in range(_NEWTON_STEPS):
         friction, slope = _friction_and_slope(re, relative_roughness)
-        resistance = friction + local * re
+        resistance = friction + local * re + laminar
         exponent = 1 + (friction * slope + local * re) / resistance
         re = maximum(re * exp(log(target / (resistance * re)) / exponent), 1.0)
     friction, _ = _friction_and_slope(re, relative_roughness)
-    return where(known < 64 + local, _laminar_resistance_at(known, local), friction + local * re)
+    creeps = known < creeping + local
+    return where(creeps, _laminar_resistance_at(known, local, creeping), friction + local * re + laminar)
 
 
-def _laminar_resistance_at(known: Any, local: Any) -> Any:
-    """64 + local Re [-] where times Re it is `known`."""
-    return (64 + sqrt(64 * 64 + 4 * local * known)) / 2
+def _laminar_resistance_at(known: Any, local: Any, creeping: Any) -> Any:
+    """creeping + local Re [-] where times Re it is `known`."""
+    return (creeping + sqrt(creeping * creeping + 4 * local * known)) / 2
 
 
 def short_tube_flow(p_a: Any, p_b: Any, diameter: Any, length: Any, fluid: Fluid) -> Any:

@@ -55,7 +55,9 @@ def by_hand():
         "faces": math.pi * (50 * UM) ** 3 * 10 * BAR / (6 * mu * math.log(2)),
         "line": through(12 * MM, high, lambda v: churchill(v * 12 * MM / NU) * 2.0 / (12 * MM)),
         "pipe": math.pi * (12 * MM) ** 4 * 0.1 * BAR / (128 * mu * 0.5),
-        "bend": through(bore, low, lambda v: 0.21 / math.sqrt(2) + churchill(v * bore / NU) * math.pi),
+        "bend": through(
+            bore, low, lambda v: 0.21 / math.sqrt(2) + churchill(v * bore / NU) * math.pi + 800 * NU / (v * bore)
+        ),
         "elbow": through(bore, low, lambda v: 0.9457 / 2 + 2.047 / 4 + 1000 * NU / (v * bore)),
         "expansion": through(bore, low, lambda v: 0.75**2 + 30 * NU / (v * bore)),
         "contraction": through(bore, low, lambda v: 0.5 * 0.75**0.75 + 30 * NU / (v * bore)),

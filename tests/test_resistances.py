@@ -292,14 +292,38 @@ def test_a_loss_of_nothing_is_laminar():
         assert passed(part, drop) == pytest.approx(expected, rel=1e-9)
 
 
-def test_bend_is_friction_and_curvature():
-    """The drop of R delta of pipe with the loss of the curvature on it, at all flows; inverse, so to rounding."""
-    bend = Bend(diameter="10 mm", radius="15 mm", angle="60 deg", roughness="10 um")
-    loss = bend_loss(1.5, math.pi / 3)
-    assert loss == pytest.approx(0.9 * math.sin(math.pi / 3) * 0.21 / math.sqrt(1.5), rel=1e-12)
-    for q in np.logspace(-9, -2, 15):
-        drop = flow_laws.pipe_friction_drop(q, 0.015 * math.pi / 3, 0.01, 1e-5, STIFF, 0.0, loss)
-        assert passed(bend, drop) == pytest.approx(q, rel=1e-6)
+@pytest.mark.parametrize("laminar", [0.0, 800.0, 1e5])
+@pytest.mark.parametrize(("radius", "roughness"), [(5 * MM, 0.0), (15 * MM, 1e-5), (400 * MM, 1e-3)])
+def test_bend_is_friction_curvature_and_a_laminar_part(laminar, radius, roughness):
+    """The drop of R delta of pipe with the loss of the curvature and K_1/Re on it, from creeping flow to Re = 1e8.
+
+    1e-12: solved to rounding, as the pipe.
+    """
+    d, nu = 10 * MM, NU
+    rigid = SimpleOil(density=RHO, kinematic_viscosity=nu, bulk_modulus=1e30)
+    settings = {"angle": math.pi / 3, "roughness": roughness, "laminar_coefficient": laminar}
+    bend = Bend(diameter=d, radius=radius, **settings)
+    loss = bend_loss(radius / d, math.pi / 3)
+    reynolds = np.concatenate([np.logspace(-4, 8, 241), np.linspace(500, 6000, 441)])
+    v = reynolds * nu / d
+    q = v * math.pi / 4 * d * d
+    drop = flow_laws.pipe_friction_drop(q, radius * math.pi / 3, d, roughness, rigid, 0.0, loss)
+    drop = drop + laminar / reynolds * RHO * v * v / 2
+    np.testing.assert_allclose(passed(bend, drop, rigid), q, rtol=1e-12)
+    np.testing.assert_allclose(passed(bend, -drop, rigid), -q, rtol=1e-12)
+
+
+def test_bend_at_rest():
+    """Slope at zero drop: dp = (64 R delta/d + K_1) rho nu v/(2 d)."""
+    part = Bend(diameter=10 * MM, radius=15 * MM)
+    expected = math.pi / 4 * 1e-4 * 2 * 0.01 / ((64 * 1.5 * math.pi / 2 + 800) * RHO * NU)
+    assert slope_at(part, 0.0) == pytest.approx(expected, rel=1e-9)
+
+
+def test_loss_of_a_bend_by_its_formula():
+    """0.9 sin 60 deg 0.21/sqrt(1.5)."""
+    expected = 0.9 * math.sin(math.pi / 3) * 0.21 / math.sqrt(1.5)
+    assert bend_loss(1.5, math.pi / 3) == pytest.approx(expected, rel=1e-12)
 
 
 def test_bend_loss_has_no_jumps():

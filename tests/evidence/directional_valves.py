@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 from building import circuit
-from crescentlab.components.directional_valves import FourThreeValve, ThreeTwoValve, TwoTwoValve
+from crescentlab.components.directional_valves import FourThreeValve, FourTwoValve, ThreeTwoValve, TwoTwoValve
 from crescentlab.components.fluids import SimpleOil
 from scipy.optimize import brentq
 
@@ -41,6 +41,7 @@ def pressure_flow() -> list[Number]:
 @evidence(
     "two_two_valve",
     "three_two_valve",
+    "four_two_valve",
     "four_three_valve",
     source="linear edge with overlap u: s = (x - u)/(1 - u), and w/4/(1 - u) at x = u for the rounding w",
     tolerance=1e-6,
@@ -56,11 +57,62 @@ def overlap() -> list[Number]:
         three = ThreeTwoValve(**lapped).equations(
             p_supply=100 * BAR, p_work=0.0, p_tank=0.0, stroke=(1 + x) / 2, fluid=OIL
         )["q_in"]
-        four = FourThreeValve(**lapped).equations(
-            p_supply=100 * BAR, p_a=0.0, p_b=0.0, p_tank=0.0, stroke=x, fluid=OIL
-        )["q_supply_a"]
-        for name, q in (("two_two_valve", two), ("three_two_valve", three), ("four_three_valve", four)):
+        ports = {"p_supply": 100 * BAR, "p_a": 0.0, "p_b": 0.0, "p_tank": 0.0, "fluid": OIL}
+        four_two = FourTwoValve(**lapped).equations(stroke=(1 + x) / 2, **ports)["q_supply_a"]
+        four = FourThreeValve(**lapped).equations(stroke=x, **ports)["q_supply_a"]
+        for name, q in (
+            ("two_two_valve", two), ("three_two_valve", three),
+            ("four_two_valve", four_two), ("four_three_valve", four),
+        ):  # fmt: skip
             found.append(Number(f"{name} at {x:g}", share, q / full, size=1.0))
+    return found
+
+
+@evidence(
+    "two_two_valve",
+    "three_two_valve",
+    "four_two_valve",
+    source="a closed edge passes nothing; s = w/(1 - u) where the rounding of the corner ends, at x = u + w, u = w",
+    tolerance=1e-6,
+    because="tanh(2 lambda/lambda_c) is 1 to 1e-7 here; closed is 0 to the last digit",
+)
+def at_the_ends() -> list[Number]:
+    """Flows by default laps (w = 0.1 %) where an edge is meant to be shut, 350 bar over it, and 2 w from there."""
+    full = 0.7 * 10e-6 * math.sqrt(2 * 350 * BAR / RHO)
+    lapped = {"area": 10e-6, "lambda_c": 1.0}
+    two, ports = TwoTwoValve(**lapped), {"p_a": 350 * BAR, "p_b": 0.0, "fluid": OIL}
+    found = [
+        Number("2/2 at 0", 0.0, two.equations(stroke=0.0, **ports)["q"] / full, size=1e-12),
+        Number("2/2 at 2 w", 1e-3 / 0.999, two.equations(stroke=2e-3, **ports)["q"] / full),
+    ]
+    three, low = ThreeTwoValve(**lapped), {"p_supply": 350 * BAR, "p_work": 0.0, "p_tank": 0.0, "fluid": OIL}
+    found.append(Number("3/2 at 0: P to A", 0.0, three.equations(stroke=0.0, **low)["q_in"] / full, size=1e-12))
+    high = {**low, "p_work": 350 * BAR}
+    found.append(Number("3/2 at 1: A to T", 0.0, three.equations(stroke=1.0, **high)["q_out"] / full, size=1e-12))
+    four, still = FourTwoValve(**lapped), {"p_a": 0.0, "p_b": 350 * BAR, "p_tank": 0.0, "fluid": OIL}
+    for x, shut in ((0.0, ("supply_a", "b_tank")), (1.0, ("a_tank",))):
+        got = four.equations(p_supply=350 * BAR, stroke=x, **still)
+        for edge in shut:
+            name = f"4/2 at {x:g}: {edge.replace('_', ' to ')}"
+            found.append(Number(name, 0.0, got[f"q_{edge}"] / full, size=1e-12))
+    return found
+
+
+@evidence(
+    "four_two_valve",
+    source="each edge q = Cd A sqrt(2 dp/rho): P to B, A to T at stroke 0, P to A, B to T at 1",
+    tolerance=1e-6,
+    because="tanh(2 lambda/lambda_c) is 1 to 1e-7 here",
+)
+def two_positions() -> list[Number]:
+    """Flows of 10 mm^2 with 200, 120, 80 and 0 bar at P, A, B, T."""
+    valve, found = FourTwoValve(area=10e-6), []
+    at = {"p_supply": 200 * BAR, "p_a": 120 * BAR, "p_b": 80 * BAR, "p_tank": 0.0, "fluid": OIL}
+    for x, drops in ((0.0, {"supply": 120, "a": 120}), (1.0, {"supply": 80, "b": 80})):
+        got = valve.equations(stroke=x, **at)
+        for port, drop in drops.items():
+            expected = 0.7 * 10e-6 * math.sqrt(2 * drop * BAR / RHO)
+            found.append(Number(f"stroke {x:g}: into {port}", expected, got[f"q_{port}"], "L/min"))
     return found
 
 
