@@ -85,7 +85,8 @@ def nearest(name: str, known: Iterable[str], *, limit: int = 3, otherwise: str =
     names = sorted(set(known))
     within = [n for n in names if len(name) > 2 and name.lower() in re.split(r"[_\W]+", n.lower())]
     close = difflib.get_close_matches(name, names, n=limit, cutoff=0.5)
-    if offered := list(dict.fromkeys([*within[: 2 * limit], *close]))[: max(limit, min(len(within), 2 * limit))]:
+    slip = difflib.get_close_matches(name, names, n=1, cutoff=0.85)
+    if offered := list(dict.fromkeys([*slip, *within, *close]))[: max(limit, min(len(within), 2 * limit))]:
         return f"did you mean {' or '.join(offered)}?"
     if otherwise or not names:
         return otherwise or "there are none"

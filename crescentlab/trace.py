@@ -241,8 +241,6 @@ class _Tracing:
         try:
             returned = self.symbolic.equations(**{n: self.known[n] for n in self.cls.asks_for()})
             check_returned(self.cls, returned)
-            self.entering = powers(self.cls, {**self.known, **returned}, {n: self.known[n] for n in self.fluid_names})
-            returned = {**deduced(self.cls, self.entering), **returned}
             self.switching = len(bits.relations)  # those that follow come from conditions
             self.conditions = [
                 self.lowered(e.condition, bits) if isinstance(e, (Event, Failure)) else ca.SX(0)
@@ -272,6 +270,8 @@ class _Tracing:
         b = ca.vertcat(*bits.symbols) if bits.symbols else ca.SX(0, 1)
         arguments = [self.t, self.x, self.h, b, self.u, self.p, self.pf]
         y = self.column(returned, self.outputs)
+        entering = powers(self.cls, {**self.known, **returned}, {n: self.known[n] for n in self.fluid_names})
+        shown = {**deduced(self.cls, entering), **returned}
         function = functools.partial(self.function, arguments)
         relations = [Sym.of(r.lhs - r.rhs if r.operator[0] == ">" else r.rhs - r.lhs).sx for r in bits.relations]
         scales = [Sym.of(abs(r.lhs) + abs(r.rhs)).sx for r in bits.relations]
@@ -284,7 +284,7 @@ class _Tracing:
         derivative = self.column(
             {k.removeprefix("der_"): v for k, v in returned.items() if k.startswith("der_")}, self.states
         )
-        observable = self.column(returned, self.observables)
+        observable = self.column(shown, self.observables)
         clock = (
             _time_only(ca.vertcat(derivative, y, *relations), self.t, ca.vertcat(self.x, self.h, b, self.u))
             if "t" in self.cls.asks_for()
@@ -298,7 +298,7 @@ class _Tracing:
             function("rel", ca.horzcat(column(relations), column(scales))), tuple(events),
             function("cond", column(conditions)),
             function("period", column(periods)), function("clock", clock),
-            function("books", ca.cse(books(self.cls, returned, self.entering))),
+            function("books", ca.cse(books(self.cls, shown, entering))),
         )  # fmt: skip
 
     @staticmethod
