@@ -68,6 +68,25 @@ def test_a_part_alone_has_a_causality(part):
     Circuit(Netlist.read(part)).plan(allow_open=True)
 
 
+@pytest.mark.parametrize("name", CIRCUITS)
+def test_the_ledgers_close(name):
+    """Fluid to 5e-6 at the circuit's own tolerance, energy to 1e-6 and in total, and nothing that is warned of.
+
+    The pumps' volumes are a thousandth of what flows through them: their fluid reads the tolerance of its pressures.
+    """
+    balance = as_shipped(name).balance
+    assert balance is not None
+    assert max(balance.components.values(), default=0.0) < 5e-6
+    assert balance.warnings == []
+    energy = balance.energy
+    assert energy is not None
+    assert max(energy.components.values()) < 1e-6
+    spent = [*energy.dissipated.values(), *energy.silent.values(), energy.stored]
+    given = sum(energy.supplied.values()) + sum(energy.at_events.values())
+    largest = max(map(abs, [*spent, *energy.supplied.values()]))
+    assert abs(given - sum(spent)) < 1e-5 * largest
+
+
 @pytest.mark.parametrize("name", ["relief_valve", "crescent_pump"])
 def test_balance(name):
     """Per component and for the circuit less than 1e-6 of what passes is lost, as shipped."""
