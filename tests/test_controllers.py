@@ -241,3 +241,25 @@ def test_what_reads_a_mass_starts_after_it_is_on_its_stop():
     nets = {"m": ["mass.port", "sensor.port"], "x": ["sensor.y", "sampler.u"], "s": ["sampler.y"]}
     run = circuit(components=parts, nets=nets, simulation={"stop": "10 ms"}).simulate()
     assert run["sampler.y"][-1] == pytest.approx(9e-3)
+
+
+@pytest.mark.parametrize("ring", [2, 3])
+def test_what_reads_a_ring_of_samplers_starts_after_it(ring):
+    """s_0 samples 3 + s_n/2 and each the one before: these begin together, and what reads them after them."""
+    parts = {
+        "three": {"type": "constant", "value": "3"},
+        "add": {"type": "sum", "weights": "[1, 0.5]"},
+        **{f"s{k}": {"type": "sample_and_hold", "sample_time": "1 s"} for k in range(ring)},
+        "tail": {"type": "sample_and_hold", "sample_time": "1 s"},
+        "relay": {"type": "relay", "upper": "5", "lower": "1", "start": {"closed": "1"}},
+    }
+    parts["add"]["weights"] = ["1", "0.5"]
+    nets = {
+        "c": ["three.y", "add.u[1]"], "a": ["add.y", "s0.u"],
+        **{f"r{k}": [f"s{k}.y", f"s{k + 1}.u"] for k in range(ring - 1)},
+        "back": [f"s{ring - 1}.y", "add.u[2]"], "t": ["tail.y"], "y": ["relay.y"],
+    }  # fmt: skip
+    nets["r0"] = ["s0.y", "s1.u", "tail.u", "relay.u"]
+    run = circuit(components=parts, nets=nets, simulation={"stop": "10 ms"}).simulate()
+    assert run["s0.y"][-1] == run["tail.y"][-1] == 3.0
+    assert run["relay.y"][-1] == 1.0

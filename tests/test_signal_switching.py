@@ -128,3 +128,18 @@ def test_a_converter_of_limits_clock_and_steps():
     later = result.time > 0
     assert np.all(np.abs(result["part.y"] - result["clock.y"])[later] <= 5 / 256 * (1 + 1e-12))
     assert len(set(result["part.level"])) > 40
+
+
+@pytest.mark.parametrize("solver", ["lsoda", "rodas", "dopri"])
+@pytest.mark.parametrize("excess", [0.0, 1e-12, 1e-9, 1e-8, 1e-6, 1e-3])
+def test_a_wave_that_hardly_reaches_an_edge_comes_back(solver, excess):
+    """A sine of half a step, or little more: the steps err by no more than half a step, and their integral is small."""
+    parts = {
+        "wave": {"type": "sine", "amplitude": repr(0.5 * (1 + excess)), "frequency": "1 Hz"},
+        "steps": {"type": "quantizer", "step": "1"},
+        "sum": {"type": "integrator"},
+    }
+    nets = {"u": ["wave.y", "steps.u"], "y": ["steps.y", "sum.u"], "i": ["sum.y"]}
+    run = circuit(components=parts, nets=nets, simulation={"stop": "1 s"}).simulate(solver=solver)
+    assert np.abs(run["steps.y"] - run["wave.y"]).max() <= 0.5 * (1 + excess) + 1e-6
+    assert abs(run["sum.y"][-1]) < 0.05

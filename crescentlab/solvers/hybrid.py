@@ -14,6 +14,8 @@ from collections.abc import Callable
 from typing import Any, NoReturn
 
 import numpy as np
+from scipy.sparse import csr_array
+from scipy.sparse.csgraph import connected_components
 
 from crescentlab.errors import SimulationError
 from crescentlab.prepared import Evaluator, Prepared
@@ -189,12 +191,16 @@ class Hybrid:
         return [self.rising[k] for k in np.flatnonzero(risen)]
 
     def foremost(self, fired: list[int]) -> list[int]:
-        """All but initial events that read what another is about to set, which may rise again; all, if none is free."""
+        """All but initial events that read what another is about to set; these may rise again in the next round.
+
+        Those that read each other in a ring go together.
+        """
         if len(fired) < 2 or not any(self.system.events[k].initial for k in fired):
             return fired
-        free = np.logical_not(np.asarray(self.system.reading(fired)).any(axis=1))
-        if not free.any():
-            return fired
+        reading = self.system.reading(fired)
+        ring = connected_components(csr_array(reading), connection="strong")[1]
+        waits = (reading & (ring[:, None] != ring[None, :])).any(axis=1)
+        free = ~np.isin(ring, ring[waits])
         waiting = {k for k, now in zip(fired, free, strict=True) if not now}
         self.holds[[place for place, k in enumerate(self.rising) if k in waiting]] = False
         return [k for k in fired if k not in waiting]
@@ -307,15 +313,13 @@ class Hybrid:
         return float(g[k]), float(rate[k])
 
     def close_in(self, k: int, low: float, high: float, x: np.ndarray) -> float:
-        """The sign change of relation k in [low, high] by bisection."""
-        left = np.sign(self.at(k, low, x)[0])
-        if left == 0:
-            return low
+        """The sign change of relation k in [low, high] by bisection; after a zero at ``low``, where it comes back."""
+        left = np.sign(self.at(k, low, x)[0]) or -np.sign(self.at(k, high, x)[0])
         while high - low > self.time_tolerance:
             middle = (low + high) / 2
             if middle in (low, high):
                 break
-            if np.sign(self.at(k, middle, x)[0]) == left:
+            if np.sign(self.at(k, middle, x)[0]) in (left, 0.0):
                 low = middle
             else:
                 high = middle
