@@ -723,7 +723,7 @@ def test_the_summary_is_of_the_run_not_of_its_output_grid(capsys: pytest.Capture
         ),
     ],
 )
-def test_a_stranger_is_told_what_there_is(command: list[str], told: str, capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_newcomer_is_told_what_there_is(command: list[str], told: str, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(command) == 2
     assert told in capsys.readouterr().err
 
