@@ -23,8 +23,8 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
-from crescentlab.columns import evaluate
-from crescentlab.prepared import LARGE, Prepared, prepare, shared
+from crescentlab.columns import Columns
+from crescentlab.prepared import LARGE, prepare, shared
 from crescentlab.solvers.trajectory import GAUSS_NODES, GAUSS_WEIGHTS, Trajectory
 from crescentlab.symbols import column
 from crescentlab.system import System, Values
@@ -129,7 +129,7 @@ def _kept(
     system: System, names: list[str], left: Array, most: Array, lost: Array, supplied: Array, change: _Change
 ) -> EnergyBalance | None:
     """The ledger of energy; None if no component keeps books."""
-    silent = system.silent()
+    silent = set(system.silent())
     entered = {name: float(each) for name, each in zip(names, left, strict=True) if name in silent}
     if len(entered) == len(names):
         return None
@@ -168,7 +168,7 @@ def _changes(system: System, values: Values, trajectory: Trajectory, stored: lis
     t, x, h, b = trajectory.steps.arrays()
     at = trajectory.steps.jumps
     found: list[_Change] = []
-    for amounts in evaluate(_prepared(system, stored), (t.reshape(1, -1), x.T, h.T, b.T), values.p):
+    for amounts in _columns(system, "stored", stored)((t.reshape(1, -1), x.T, h.T, b.T), values.p):
         jumps = amounts[:, at] - amounts[:, at - 1]
         total, largest = amounts[:, -1] - amounts[:, 0], np.abs(amounts).max(axis=1)
         found.append(_Change(total, jumps.sum(axis=1), np.abs(jumps).sum(axis=1), largest))
@@ -177,7 +177,7 @@ def _changes(system: System, values: Values, trajectory: Trajectory, stored: lis
 
 def _integrals(system: System, values: Values, trajectory: Trajectory, rates: list[ca.SX]) -> list[Array]:
     """Integrals of ``rates`` over the run."""
-    prepared = _prepared(system, rates)
+    function = _columns(system, "rates", rates)
     pieces = trajectory.pieces
     low, high = np.array(pieces.low), np.array(pieces.high)
     h, b = np.array(pieces.h).T, np.array(pieces.b).T
@@ -186,16 +186,21 @@ def _integrals(system: System, values: Values, trajectory: Trajectory, rates: li
     for node, weight in enumerate(GAUSS_WEIGHTS):
         # relations that compare time read it from frozen bits, so the node's own time serves signals
         t = low + (high - low) * GAUSS_NODES[node]
-        now = evaluate(prepared, (t.reshape(1, -1), x[:, node, :].T, h, b), values.p)
+        now = function((t.reshape(1, -1), x[:, node, :].T, h, b), values.p)
         found = [sum_ + rate @ (weight * (high - low)) for sum_, rate in zip(found, now, strict=True)]
     return found
 
 
-def _prepared(system: System, columns: list[ca.SX]) -> Prepared:
-    """The columns as a function; pressures of a net are one symbol, so that what its ports carry is found once."""
-    whole = shared(ca.densify(column(columns)), LARGE)
-    parts = ca.vertsplit(whole, [0, *np.cumsum([each.numel() for each in columns]).tolist()])
-    return prepare("ledger", system.arguments[:-1], system.p, parts, seldom=True)
+def _columns(system: System, name: str, columns: list[ca.SX]) -> Columns:
+    """The columns as a function, made once; pressures of a net are one symbol: what its ports carry is found once."""
+
+    def made() -> Columns:
+        whole = shared(ca.densify(column(columns)), LARGE)
+        parts = ca.vertsplit(whole, [0, *np.cumsum([each.numel() for each in columns]).tolist()])
+        return Columns(prepare("ledger", system.arguments[:-1], system.p, parts, seldom=True))
+
+    found: Columns = system.once(f"ledger of {name}", made)
+    return found
 
 
 def _errors(names: list[str], missing: Array, passing: Array, change: _Change) -> tuple[dict[str, float], float]:

@@ -6,6 +6,7 @@ operation of numpy takes one nanosecond for each, so that the series of a long r
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Callable, Sequence
 from typing import Any
 
@@ -46,29 +47,39 @@ OPERATIONS: dict[int, Callable[..., Any]] = {
 """What is done by CasADi's number of an operation."""
 
 
-def evaluate(prepared: Prepared, arguments: Sequence[Array], p: Array) -> list[Array]:
-    """Outputs, each of shape (rows, points), for arguments of shape (rows, points) and the parameters p.
-
-    With an operation that numpy lacks, or for few points, CasADi evaluates.
-    """
-    function, q = prepared.function, np.array(prepared.parameters(p)).ravel()
-    points = arguments[0].shape[1]
-    steps = _steps(function) if points >= FEW else None
-    if steps is None:
-        found = function(*arguments, q)
-        return [np.array(each) for each in (found if isinstance(found, tuple) else (found,))]
-    outputs = [np.empty((function.numel_out(k), points)) for k in range(function.n_out())]
-    work = np.empty((function.sz_w(), BLOCK))
-    with np.errstate(all="ignore"):
-        for low in range(0, points, BLOCK):
-            block = slice(low, min(low + BLOCK, points))
-            given, wanted = [a[:, block] for a in arguments], [o[:, block] for o in outputs]
-            _run(steps, given, q, work[:, : block.stop - low], wanted)
-    return outputs
-
-
 Step = tuple[Any, ...]
 """``("in", w, argument, row)``, ``("out", w, output, row)``, ``("const", w, value)``; or a function, w, operands' w."""
+
+
+class Columns:
+    """A prepared function, taken apart when it is first evaluated at many points, and once only."""
+
+    def __init__(self, prepared: Prepared) -> None:
+        self.prepared = prepared
+
+    @functools.cached_property
+    def steps(self) -> list[Step] | None:
+        """The function's instructions; None if there is one that numpy lacks."""
+        return _steps(self.prepared.function)
+
+    def __call__(self, arguments: Sequence[Array], p: Array) -> list[Array]:
+        """Outputs, each of shape (rows, points), for arguments of shape (rows, points) and the parameters p.
+
+        With an operation that numpy lacks, or for few points, CasADi evaluates.
+        """
+        function, q = self.prepared.function, np.array(self.prepared.parameters(p)).ravel()
+        points = arguments[0].shape[1]
+        if points < FEW or self.steps is None:
+            found = function(*arguments, q)
+            return [np.array(each) for each in (found if isinstance(found, tuple) else (found,))]
+        outputs = [np.empty((function.numel_out(k), points)) for k in range(function.n_out())]
+        work = np.empty((function.sz_w(), BLOCK))
+        with np.errstate(all="ignore"):
+            for low in range(0, points, BLOCK):
+                block = slice(low, min(low + BLOCK, points))
+                given, wanted = [a[:, block] for a in arguments], [o[:, block] for o in outputs]
+                _run(self.steps, given, q, work[:, : block.stop - low], wanted)
+        return outputs
 
 
 def _steps(function: ca.Function) -> list[Step] | None:

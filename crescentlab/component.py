@@ -37,7 +37,7 @@ from pydantic import BaseModel, ConfigDict, Field
 from pydantic.fields import FieldInfo
 
 from crescentlab import units
-from crescentlab.domain import HYDRAULIC, Declared, Held, Observable, Port, Size, State
+from crescentlab.domain import ENERGY_ENTRIES, HYDRAULIC, Declared, Held, Observable, Port, Size, State
 from crescentlab.errors import ComponentError, nearest
 from crescentlab.maths import Event, Failure, Tick
 from crescentlab.units import Quantity
@@ -105,7 +105,7 @@ class Component(BaseModel):
     @classmethod
     def deduced_observable(cls) -> str | None:
         """The loss or supply that ``equations`` may leave out: where nothing else is said of energy."""
-        said = [o for o in _declared(cls, Observable) if o.entry in ("energy", "dissipation", "supply")]
+        said = [o for o in _declared(cls, Observable) if o.entry in ENERGY_ENTRIES]
         return said[0].name if len(said) == 1 and said[0].deduced else None
 
     @classmethod

@@ -50,6 +50,9 @@ CHAMBER = Domain(
 )
 SIGNAL = Domain("signal", (("", units.ratio),), (), "a source of the signal, for example {type: constant, value: 1}")
 
+ENERGY_ENTRIES: tuple[Entry, ...] = ("energy", "dissipation", "supply")
+"""The entries of the ledger of energy."""
+
 Size = int | str | Callable[[Any], int]
 """A number of elements: fixed, the name of an int field or property, or a function of the component."""
 

@@ -19,12 +19,9 @@ from typing import Any
 import casadi as ca
 
 from crescentlab.component import Component, fluid_names
-from crescentlab.domain import CHAMBER, HYDRAULIC, ROTATIONAL, SIGNAL, TRANSLATIONAL, Observable, Port
+from crescentlab.domain import CHAMBER, ENERGY_ENTRIES, HYDRAULIC, ROTATIONAL, SIGNAL, TRANSLATIONAL, Observable, Port
 from crescentlab.fluid import Fluid
 from crescentlab.symbols import Sym, column
-
-ENTRIES = ("energy", "dissipation", "supply")
-"""The entries of the ledger of energy, in the order of :func:`books`; the power that enters and its size follow."""
 
 
 @functools.cache
@@ -36,7 +33,7 @@ def power_ports(cls: type[Component]) -> tuple[Port, ...]:
 @functools.cache
 def keeps_books(cls: type[Component]) -> bool:
     """Whether the class says what becomes of the power that enters."""
-    return cls.lossless or any(o.entry in ENTRIES for o in cls.declared(Observable))
+    return cls.lossless or any(o.entry in ENERGY_ENTRIES for o in cls.declared(Observable))
 
 
 @functools.cache
@@ -110,6 +107,6 @@ def books(cls: type[Component], values: Mapping[str, Any], entering: ca.SX) -> c
         return ca.SX(0, 1)
     entries = [
         sum((Sym.of(values[o.name]).sx for o in cls.declared(Observable) if o.entry == entry), start=ca.SX(0))
-        for entry in ENTRIES
+        for entry in ENERGY_ENTRIES
     ]
     return column([*entries, ca.sum1(entering), ca.sum1(ca.fabs(entering)) / 2])

@@ -18,7 +18,7 @@ import casadi as ca
 import numpy as np
 
 from crescentlab.causality import Plan
-from crescentlab.columns import evaluate
+from crescentlab.columns import Columns
 from crescentlab.component import Component
 from crescentlab.domain import Held, State
 from crescentlab.elaborate import Design
@@ -119,7 +119,6 @@ class System:
     _contents: dict[str, tuple[Callable[[], ca.SX], Callable[[], tuple[ca.SX, ca.SX]]]]
     _energies: Callable[[], dict[str, ca.SX]]
     _passing: Callable[[], dict[str, tuple[ca.SX, ca.SX]]]
-    _functions: dict[Any, ca.Function] = field(default_factory=dict)
     _once: dict[Any, Any] = field(default_factory=dict)
     built: dict[tuple[str, str], Prepared] = field(default_factory=dict)
     """Functions that have been compiled, by name and form (see :mod:`crescentlab.solvers.promotion`)."""
@@ -211,22 +210,15 @@ class System:
             return self.variables[name]
         raise InputError(f"no variable {name!r}: {nearest(name, self.variables)}")
 
-    def function_of(self, names: Sequence[str]) -> ca.Function:
-        """A function giving the named variables' elements one after another."""
-        key = tuple(names)
-        if key not in self._functions:
-            elements = [e for name in names for e in self.find(name).expression()]
-            self._functions[key] = ca.Function("v", self.arguments, [shared(ca.densify(column(elements)), LARGE)])
-        return self._functions[key]
-
     def series(self, names: Sequence[str], t: Array, x: Array, h: Array, b: Array, p: Array) -> Array:
         """The named variables' elements one after another at times (m,), states (m, n) and so on: (elements, m)."""
         key = ("series", *names)
         if key not in self._once:
             elements = [e for name in names for e in self.find(name).expression()]
             whole = shared(ca.densify(column(elements)), LARGE)
-            self._once[key] = prepare("series", self.arguments[:-1], self.p, [whole], seldom=True)
-        return evaluate(self._once[key], (t.reshape(1, -1), x.T, h.T, b.T), p)[0]
+            self._once[key] = Columns(prepare("series", self.arguments[:-1], self.p, [whole], seldom=True))
+        found: list[Array] = self._once[key]((t.reshape(1, -1), x.T, h.T, b.T), p)
+        return found[0]
 
     def contents(self) -> dict[str, tuple[ca.SX, ca.SX, ca.SX]]:
         """Per storing component: stored volume, sum of its flows, half the sum of their magnitudes."""

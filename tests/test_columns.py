@@ -7,8 +7,9 @@ import numpy as np
 import pytest
 
 import crescentlab as cl
-from crescentlab.columns import BLOCK, FEW, OPERATIONS, evaluate
+from crescentlab.columns import BLOCK, FEW, OPERATIONS, Columns
 from crescentlab.prepared import prepare
+from crescentlab.system import System
 
 X, Y, P = ca.SX.sym("x"), ca.SX.sym("y"), ca.SX.sym("p")
 UNARY = [
@@ -34,6 +35,12 @@ def sets(points: int) -> list[np.ndarray]:
     return [x, y]
 
 
+def by_casadi(system: System, names: list[str]) -> ca.Function:
+    """The named variables as a function that CasADi evaluates."""
+    elements = [e for name in names for e in system.find(name).expression()]
+    return ca.Function("v", system.arguments, [ca.densify(ca.vertcat(*elements))])
+
+
 @pytest.mark.parametrize("points", [1, FEW, 3 * BLOCK + 5])
 def test_every_operation(points: int) -> None:
     """Each of CasADi's operations on scalars, with infinities and what is no number, to the last digits of libm."""
@@ -41,7 +48,7 @@ def test_every_operation(points: int) -> None:
     prepared = prepare("all", [X, Y], P, [ca.densify(ca.vertcat(*outputs[:20])), ca.densify(ca.vertcat(*outputs[20:]))])
     arguments, p = sets(points), np.array([0.3])
     known = prepared.function(*arguments, prepared.parameters(p))
-    for found, wanted in zip(evaluate(prepared, arguments, p), known, strict=True):
+    for found, wanted in zip(Columns(prepared)(arguments, p), known, strict=True):
         np.testing.assert_allclose(found, np.array(wanted), rtol=1e-14, atol=0)
 
 
@@ -49,7 +56,7 @@ def test_all_operations_of_the_library_are_known() -> None:
     """No shipped circuit has an instruction for which CasADi must step in."""
     for name in ("crescent_pump", "axial_piston_pump", "position_servo", "water_hammer"):
         system = cl.load(name).system()
-        function = system.function_of(list(system.variables))
+        function = by_casadi(system, list(system.variables))
         kinds = {function.instruction_id(k) for k in range(function.n_instructions())}
         assert kinds - set(OPERATIONS) <= {ca.OP_INPUT, ca.OP_OUTPUT, ca.OP_CONST}
 
@@ -61,7 +68,7 @@ def test_a_long_run_shows_what_a_point_gives() -> None:
     assert run.time.size > BLOCK or run.time.size > FEW
     run.load(names)
     t, x, h, b = run.trajectory.steps.arrays()
-    function = run.system.function_of(names)
+    function = by_casadi(run.system, names)
     for row in (0, FEW, run.time.size - 1):
         known = np.array(function(t[row], x[row], h[row], b[row], run.values.p)).ravel()
         np.testing.assert_allclose([run[name][row] for name in names], known, rtol=1e-12, atol=1e-300)

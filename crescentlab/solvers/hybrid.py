@@ -211,7 +211,9 @@ class Hybrid:
             if event.kind == "fail":
                 names = event.message_names
                 values: np.ndarray | list[float] = (
-                    np.array(self.system.function_of(names)(t, x, self.h, self.b, self.p)).ravel() if names else []
+                    self.system.series(names, np.array([t]), x[None], self.h[None], self.b[None], self.p).ravel()
+                    if names
+                    else []
                 )
                 shown = {
                     n.rpartition(".")[2]: q.show(float(v), DISPLAY.get(q.name, "" if q.si == "1" else None))

@@ -79,7 +79,9 @@ def exact_lines(design: Design, system: System, values: Values, at: Snapshot) ->
         line = ExactLine(
             name, (ports[0], ports[1]), (nets[0], nets[1]), part, design.fluids[system.plan.fluids[name]["fluid"]]
         )
-        now = system.function_of([*line.pressures, *line.flows])(at.t, at.x, at.h, at.b, values.p)
+        now = system.series(
+            [*line.pressures, *line.flows], np.array([at.t]), at.x[None], at.h[None], at.b[None], values.p
+        )
         p_a, p_b, q_a, q_b = np.array(now).ravel().tolist()
         found.append(
             ExactLine(name, line.ports, line.nets, part, line.fluid, (p_a + p_b) / 2, (q_a - q_b) / 2)
