@@ -1,7 +1,7 @@
 """Functions of the expression graph at many points at once: one instruction after another, in numpy, block by block.
 
 CasADi evaluates a function point by point, some eight nanoseconds for an instruction. Over a thousand points an
-operation of numpy takes one nanosecond for each, so that the series of a long run take a quarter of the time.
+operation of numpy takes one nanosecond for each, so that the series of a long run take a fifth of the time.
 """
 
 from __future__ import annotations

@@ -281,3 +281,14 @@ def test_what_drives_and_what_brakes_are_told_apart() -> None:
     books = energy(cl.load("hydrostatic_transmission").simulate())
     assert {name for name, joules in books.supplied.items() if joules > 0} == {"engine"}
     assert all(joules < 0 for name, joules in books.supplied.items() if name != "engine")
+
+
+def test_the_page_of_lines_shows_what_its_circuit_gives(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """The flow stopped at the end of a line, as docs/lines.md has it: the energy in its summary is the printed one."""
+    page = (Path(__file__).parents[1] / "docs" / "lines.md").read_text(encoding="utf-8")
+    text = page.partition("# file: stopped_flow.yaml\n")[2].partition("```")[0]
+    (tmp_path / "stopped_flow.yaml").write_text(text, encoding="utf-8")
+    command = ["simulate", str(tmp_path / "stopped_flow.yaml"), "--solver", "rodas", "--rtol", "1e-7", "-o", "none"]
+    assert main(command) == 0
+    (shown,) = [line for line in page.splitlines() if line.startswith("  energy ")]
+    assert shown in capsys.readouterr().out
