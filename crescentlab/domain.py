@@ -39,7 +39,7 @@ HYDRAULIC = Domain(
 )
 TRANSLATIONAL = Domain(
     "translational", (("x", units.length), ("v", units.velocity)), (("f", units.force),),
-    "a mass, for example {type: mass_with_stops, mass: 20 g}",
+    "a mass, for example {type: mass, mass: 20 g}",
 )  # fmt: skip
 ROTATIONAL = Domain(
     "rotational", (("phi", units.angle), ("omega", units.speed)), (("torque", units.torque),),

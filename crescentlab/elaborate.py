@@ -158,7 +158,9 @@ class _Elaboration:
             node = replace(netlist.node.find(path), place=netlist.place(*path))
             assert isinstance(node.value, dict)
             if "type" not in node.value:
-                raise InputError("the fluid needs a type, for example fluid: {type: simple_oil}", node.place)
+                raise InputError(
+                    "the fluid needs a type, for example fluid: {type: water, temperature: 20 degC}", node.place
+                )
             cls = library.fluid(str(node.value["type"].value), node.place_of("type"))
             made[name] = self.instance(cls, node, _scope_lookup(values, netlist), overrides, name, netlist.folder)
         return made

@@ -171,7 +171,8 @@ class Netlist:
 
 
 _KINDS: dict[str, tuple[type, str]] = {
-    "fluid": (dict, "{type: simple_oil, density: 860 kg/m^3}"), "fluids": (dict, "{oil: {type: simple_oil}}"),
+    "fluid": (dict, "{type: water, temperature: 20 degC}"),
+    "fluids": (dict, "{coolant: {type: water, temperature: 20 degC}}"),
     "parameters": (dict, "{supply: 30 L/min}"), "components": (dict, "{tank: {type: tank}}"),
     "ports": (dict, "{inlet: p_line}"),
     "nets": (dict, "{p_line: [pump.port, line.port]}"), "outputs": (dict, "{loss: '= line.p * valve.q'}"),
@@ -195,7 +196,7 @@ def _collections(node: Node) -> None:
         if not isinstance(node.find(("nets", name)).value, dict):
             _shaped(node, ("nets", name), list, "[pump.port, line.port]")
     for name in _keys(node, "fluids"):
-        _shaped(node, ("fluids", name), dict, "{type: simple_oil, density: 860 kg/m^3}")
+        _shaped(node, ("fluids", name), dict, "{type: water, temperature: 20 degC}")
 
 
 def _keys(node: Node, section: str) -> list[str]:

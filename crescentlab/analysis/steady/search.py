@@ -62,7 +62,7 @@ class OperatingPoint:
     resting: tuple[str, ...]
     """Unknowns held fast by the mode they are in: a mass on its stop."""
     time_constant: float | None
-    """Slowest way back to the point [s]; None if not known."""
+    """Slowest way back to the point [s]; None if not known, or if there is none."""
     wall_s: float
     warnings: tuple[str, ...] = ()
     result: Result = field(init=False, repr=False)
