@@ -21,8 +21,9 @@ from scipy import sparse
 from scipy.linalg import lapack
 from scipy.sparse.linalg import LinearOperator, onenormest, splu
 
-from crescentlab.analysis.steady.closed import ClosedSet, Ledger
-from crescentlab.analysis.steady.rest import Matrix, Point, Site
+from crescentlab.analysis.steady.closed import Ledger
+from crescentlab.analysis.steady.rest import Point, Site
+from crescentlab.closed_sets import ClosedSet, Matrix
 from crescentlab.errors import SimulationError
 
 Array = np.ndarray

@@ -17,8 +17,8 @@ from typing import Any
 
 import casadi as ca
 import numpy as np
-from scipy import sparse
 
+from crescentlab.closed_sets import Matrix, empty_matrix, nonzeros
 from crescentlab.errors import SimulationError
 from crescentlab.prepared import Evaluator, Prepared, jacobian, prepare
 from crescentlab.solvers.hybrid import Hybrid
@@ -28,9 +28,6 @@ from crescentlab.system import System, Values
 from crescentlab.units import Quantity
 
 Array = np.ndarray
-Matrix = Any
-"""A sparse matrix of SciPy, its columns compressed."""
-
 RUNAWAY = 1e6
 """An unknown this many times its nominal size plus magnitude at the start has run away."""
 
@@ -55,6 +52,8 @@ class Equations:
     drift: Prepared
     """(t, x, h, b) -> nonzeros of dF/dc, and dc/dt, c = (t, counting states, counting held values)."""
     drift_pattern: ca.Sparsity
+    y: ca.SX
+    """Symbols of the unknowns."""
     states: Array
     """Places of the unknowns among the states, shape (n_x,)."""
     held: Array
@@ -83,7 +82,7 @@ def _equations(system: System, groups: tuple[int, ...]) -> Equations:
     return Equations(
         prepare("rest", arguments, system.p, [F, nonzeros(slope)]), slope.sparsity(),
         prepare("drift", arguments, system.p, [nonzeros(drift), rates], seldom=True), drift.sparsity(),
-        states, held,
+        y, states, held,
     )  # fmt: skip
 
 
@@ -95,11 +94,6 @@ def picked(vector: ca.SX, places: Array) -> ca.SX:
 def unknowns(system: System, states: Array, held: Array) -> ca.SX:
     """The symbols of the unknowns y."""
     return ca.vertcat(picked(system.x, states), picked(system.h, held))
-
-
-def nonzeros(matrix: ca.SX) -> ca.SX:
-    """Nonzeros in column order, one below the other."""
-    return ca.reshape(matrix.nz[:], matrix.nnz(), 1)
 
 
 def _rates(system: System, groups: tuple[int, ...]) -> tuple[ca.SX, ca.SX]:
@@ -150,7 +144,7 @@ class Site:
         """Periods of the ticks [s]; equal ones stand once."""
         self.equations = equations(system, tuple(int(k) for k in np.searchsorted(self.periods, rounded)))
         self._rest = Evaluator(self.equations.function, values.p)
-        self._slope = self.slopes(self.equations.pattern)
+        self._slope = empty_matrix(self.equations.pattern)
         self.limits = PressureLimits(system)
         states, held = self.equations.states, self.equations.held
         self.n_x = states.size
@@ -164,12 +158,6 @@ class Site:
         self.bound = np.full(self.nominal.size, np.inf)
         """Magnitudes beyond which unknowns have run away."""
         self.evaluations = 0
-
-    @staticmethod
-    def slopes(pattern: ca.Sparsity) -> Matrix:
-        """An empty matrix of this sparsity, whose data are set later."""
-        rows, start = np.array(pattern.row(), dtype=np.int32), np.array(pattern.colind(), dtype=np.int32)
-        return sparse.csc_matrix((np.zeros(rows.size), rows, start), shape=pattern.shape)
 
     # -- unknowns --------------------------------------------------------------------------------
 
@@ -203,7 +191,7 @@ class Site:
     def drift(self, point: Point, ahead: float = 0.0) -> tuple[Matrix, Array]:
         """dF/dc and dc/dt of the time and of what counts, ``ahead`` [s] after the frozen time."""
         nonzeros, rates = Evaluator(self.equations.drift, self.values.p)(self.t + ahead, point.x, point.h, point.b)
-        slope = self.slopes(self.equations.drift_pattern)
+        slope = empty_matrix(self.equations.drift_pattern)
         slope.data[:] = nonzeros
         return slope, rates.copy()
 
