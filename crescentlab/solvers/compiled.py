@@ -67,7 +67,7 @@ def integrate(
     """
     run = _CompiledRun(system, values, options, progress)
     if start is not None:
-        run.resume(start)
+        run.hybrid.resume(start)
     return run.run()
 
 
@@ -156,13 +156,18 @@ class _CompiledRun:
         r.zeno_span = ZENO_SPAN * self.options.span
         r.last_event = -1
 
-    def resume(self, start: Snapshot) -> None:
-        """Begin where another run ended; its states and held values are the start values already."""
-        r, kept = self.run_, self.run_.kept
-        kept["b"][: r.n_bits] = start.b
-        kept["holds"][: r.n_conditions] = start.holds
-        kept["origin"][: r.n_ticks], kept["ticked"][: r.n_ticks] = start.clocks(self.hybrid.periods, r.tolerance)
-        r.resumed = 1
+    def enter(self) -> None:
+        """Compute the start as for every solver, and let the loop go on from there."""
+        r, kept, hybrid = self.run_, self.run_.kept, self.hybrid
+        x = self.values.x0
+        self.diagnosis.check_finite(r.t, x, self.diagnosis.functions.rhs(r.t, x), "at the start")
+        x, names = hybrid.enter(r.t, x)
+        kept["x"][: r.n], kept["h"][: r.n_held], kept["b"][: r.n_bits] = x, hybrid.h, hybrid.b
+        kept["holds"][: r.n_conditions], r.finished = hybrid.holds, hybrid.finished
+        kept["origin"][: r.n_ticks], kept["ticked"][: r.n_ticks] = hybrid.origin, hybrid.ticked
+        places = {event.name: k for k, event in enumerate(self.system.events)}
+        kept["log_t"][: len(names)], kept["log_event"][: len(names)] = r.t, [places[name] for name in names]
+        r.events = r.logs = len(names)
 
     def end(self) -> Snapshot:
         """Where the run stands."""
@@ -213,6 +218,8 @@ class _CompiledRun:
         begun = self.begun = self.shown_at = time.perf_counter()
         status, error = "done", ""
         try:
+            with np.errstate(all="ignore"):
+                self.enter()
             status = self.advance()
         except SimulationError as problem:
             t = self.run_.t

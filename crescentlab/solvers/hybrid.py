@@ -108,13 +108,16 @@ class Hybrid:
         clocks = {"origin": self.origin, "ticked": self.ticked, "period": self.periods}
         return {"h": self.h, "b": self.b, "holds": self.holds, **clocks}
 
-    def begin(self, t: float, x: np.ndarray) -> None:
-        """Bits at the start: truth first, then settling."""
+    def enter(self, t: float, x: np.ndarray) -> tuple[np.ndarray, list[str]]:
+        """The start of a run, the same for every solver: bits take their truth and settle, then what is true fires.
+
+        Returns the state after it and the names of what fired. A resumed run has its bits and conditions already.
+        """
         if self.n and not self.resumed:
             for _ in range(2):
                 g = self.relation(t, x)[0]
                 self.b = np.where(self.truth(g), 1.0, 0.0)
-        self.settle(t, x)
+        return self.stop(t, x, [], starts=not self.resumed)
 
     def truth(self, g: np.ndarray) -> np.ndarray:
         """Truth of each relation: above its boundary, or on it unless strict."""

@@ -139,9 +139,7 @@ class _Run:
         o, hybrid = self.options, self.hybrid
         t, x = o.start, self.values.x0.copy()
         self.diagnosis.check_finite(t, x, self.functions.rhs(t, x), "at the start")
-        hybrid.begin(t, x)
-        self.sync()
-        x, names = hybrid.stop(t, x, [], starts=not hybrid.resumed)
+        x, names = hybrid.enter(t, x)
         self.sync()
         self.booked(t, names)
         self.record(t, x)

@@ -620,17 +620,10 @@ static int step(Run *r)
     return event != 0 || r->t >= r->goal - r->tolerance ? stop_here(r, 0, event != 0) : PAUSED;
 }
 
+/* The start has been computed: states, held values, bits and conditions are those after it. */
 static int begin(Run *r)
 {
     r->begun = 1;
-    r->t = r->start;
-    read_relations(r, 0);
-    for (int64_t i = 0; i < r->n; i++)
-        if (!isfinite(r->fx[i])) return NOT_FINITE;
-    for (int twice = 0; twice < 2 && !r->resumed; twice++) {
-        for (int64_t k = 0; k < r->n_bits; k++) r->b[k] = r->g[k] > 0 || (r->g[k] == 0 && !r->strict[k]);
-        read_relations(r, 0);
-    }
     const int code = stop_here(r, 1, 0);
     r->step = first_step(r);
     return code;

@@ -95,7 +95,6 @@ typedef struct Run {
 
     /* where it stands */
     int64_t begun;
-    int64_t resumed; /* where another run ended: bits and conditions are known */
     int64_t finished; /* by an event of kind STOP */
     int64_t rescan; /* roots of curved relations may have changed */
     int64_t culprit; /* relation, event, state that a failure names */
