@@ -292,7 +292,6 @@ static int held_possible(Run *r)
 /* Whether f after a stop differs from f before it by more than may pass unseen. */
 static int f_changed(const Run *r, const double *old)
 {
-    if (!r->rate_exact) return 1;
     for (int64_t i = 0; i < r->n; i++)
         if (fabs(r->fx[i] - old[i]) * r->step > r->restart_share * (r->atol[i] + r->rtol * fabs(r->x[i]))) return 1;
     return 0;
@@ -301,7 +300,7 @@ static int f_changed(const Run *r, const double *old)
 /* Everything that happens at t: settle, fire, look ahead. */
 static int stop_here(Run *r, int start, int landed)
 {
-    const int64_t events = r->events, ticks = r->ticks;
+    const int64_t ticks = r->ticks;
     const int only_ticks = !start && !landed && !r->n_linear && !r->curved;
     for (int64_t k = 0; k < r->n_ticks; k++)
         if (r->origin[k] + (r->ticked[k] + 1) * r->period[k] <= r->t + r->tolerance) r->due[k] = 1, r->ticked[k]++;
@@ -317,7 +316,7 @@ static int stop_here(Run *r, int start, int landed)
     for (int64_t i = 0; i < r->n; i++)
         if (!isfinite(r->fx[i])) return NOT_FINITE;
     if (!held_possible(r)) return IMPOSSIBLE_HELD;
-    if (!start && changed && (r->jumped || (r->events > events && f_changed(r, r->rate)))) {
+    if (!start && changed && !r->finished && r->t < r->stop && (r->jumped || f_changed(r, r->rate))) {
         r->restarts++;
         if (r->last_event >= 0 && r->first_step[r->last_event] > 0)
             r->step = r->first_step[r->last_event];
@@ -616,8 +615,9 @@ static int step(Run *r)
     if (!possible(r)) return IMPOSSIBLE;
     r->tiny = h < SMALLEST * (r->stop - r->start) ? r->tiny + 1 : 0;
     if (r->tiny > COLLAPSE_COUNT) return COLLAPSED;
-    if (event != 0 && !r->rate_exact) memcpy(r->rate, rhs(r, r->t, r->x), r->n * sizeof *r->rate), r->rate_exact = 1;
-    return event != 0 || r->t >= r->goal - r->tolerance ? stop_here(r, 0, event != 0) : PAUSED;
+    if (event == 0 && r->t < r->goal - r->tolerance) return PAUSED;
+    if (!r->rate_exact) memcpy(r->rate, rhs(r, r->t, r->x), r->n * sizeof *r->rate); /* what f is before the stop */
+    return stop_here(r, 0, event != 0);
 }
 
 /* The start has been computed: states, held values, bits and conditions are those after it. */
