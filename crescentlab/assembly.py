@@ -270,7 +270,7 @@ class _Assembly:
         """Put bits in place of the conditions on time in all that has been assembled; the derivative with them."""
         parts = [self.outputs, self.inputs, derivative, *relations, *conditions]
         ends = np.cumsum([0, *(part.numel() for part in parts)]).tolist()
-        timed = time_alone(ca.densify(column(parts)), self.t, self.x, ca.vertcat(self.h, self.b))
+        timed = time_alone(ca.densify(column(parts)), self.t, self.x, ca.vertcat(self.h, self.b), ends[3])
         if timed.bits:
             places = itertools.pairwise(ends)
             self.outputs, self.inputs, derivative, *rest = (timed.expression[low:high] for low, high in places)

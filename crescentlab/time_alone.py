@@ -13,6 +13,7 @@ from dataclasses import dataclass, field
 import casadi as ca
 
 from crescentlab.symbols import column
+from crescentlab.walk import Walk, hashes
 
 COMPARISONS = {ca.OP_LT: True, ca.OP_LE: False}
 """Operations a < b and a <= b, and whether they are strict."""
@@ -35,93 +36,62 @@ class TimeAlone:
     """Values that curve in time and depend on nothing else but parameters, as they were written."""
 
 
-def time_alone(value: ca.SX, t: ca.SX, x: ca.SX, fixed: ca.SX) -> TimeAlone:
-    """Take the conditions on time out of a dense column; x are the states, ``fixed`` held values and bits."""
-    free = list(ca.symvar(value))
-    if not any(s.element_hash() == t.element_hash() for s in free):
+def time_alone(value: ca.SX, t: ca.SX, x: ca.SX, fixed: ca.SX, paced: int) -> TimeAlone:
+    """Take the conditions on time out of a dense column; x are the states, ``fixed`` held values and bits.
+
+    The first ``paced`` rows set the pace if they are on time alone; the others are conditions, foreseen anyway.
+    """
+    if t.element_hash() not in hashes(value):
         return TimeAlone(value)
-    return _Walk(value, free, t, x, fixed).done()
+    return _Conditions(value, t, x, fixed).done(paced)
 
 
-class _Walk:
+class _Conditions(Walk):
     """One pass over the instructions of an expression, each marked by what it depends on."""
 
-    def __init__(self, value: ca.SX, free: list[ca.SX], t: ca.SX, x: ca.SX, fixed: ca.SX) -> None:
-        self.t, self.size = t, value.numel()
-        self.function = ca.Function("walk", free, [value])
-        self.written = ca.vertsplit(self.function.instructions_sx())
-        for k in range(self.function.n_instructions()):
-            if self.function.instruction_id(k) == ca.OP_INPUT:  # CasADi leaves these out
-                self.written[k] = free[self.function.instruction_input(k)[0]]
-        self.changed: dict[int, ca.SX] = {}
-        """Instructions whose expression has bits in it."""
-        self.result = TimeAlone(value)
+    def __init__(self, value: ca.SX, t: ca.SX, x: ca.SX, fixed: ca.SX) -> None:
+        super().__init__(value)
+        self.t = t
+        self.states, self.fixed = hashes(x), hashes(fixed)
+        self.outcome = TimeAlone(value)
         self.met: dict[tuple[int, ...], ca.SX] = {}
-        states, others = ({s.element_hash() for s in ca.symvar(v)} for v in (x, fixed))
-        hashes = [s.element_hash() for s in free]
-        self.timed = [h == t.element_hash() for h in hashes]
-        self.moving = [h in states for h in hashes]
-        self.held = [h in others for h in hashes]
 
-    def now(self, k: int) -> ca.SX:
-        """The expression of instruction k, with bits where it has any."""
-        return self.changed[k] if k in self.changed else self.written[k]
-
-    def done(self) -> TimeAlone:
-        walk, count = self.function, self.function.n_instructions()
-        source: dict[int, int] = {}  # instruction that wrote each place of the work vector
-        timed, moving, held = [False] * count, [False] * count, [False] * count
-        rows: dict[int, ca.SX] = {}
-        alone: dict[int, ca.SX] = {}
-        for k in range(count):
-            op, ins, outs = walk.instruction_id(k), walk.instruction_input(k), walk.instruction_output(k)
+    def done(self, paced: int) -> TimeAlone:
+        timed, moving, held = set[int](), set[int](), set[int]()
+        alone: dict[int, ca.SX] = {}  # the largest values on time and parameters alone
+        for k, op, parts in self.steps():
             if op == ca.OP_INPUT:
-                timed[k], moving[k], held[k] = self.timed[ins[0]], self.moving[ins[0]], self.held[ins[0]]
-                source[outs[0]] = k
-            elif op == ca.OP_CONST:
-                source[outs[0]] = k
-            else:
-                parts = [source[i] for i in ins]
-                timed[k] = any(timed[i] for i in parts)
-                moving[k], held[k] = any(moving[i] for i in parts), any(held[i] for i in parts)
-                if op == ca.OP_OUTPUT or moving[k] or held[k]:
-                    alone |= {i: self.written[i] for i in parts if timed[i] and not (moving[i] or held[i])}
-                if op == ca.OP_OUTPUT:
-                    if parts[0] in self.changed:
-                        rows[outs[1]] = self.changed[parts[0]]
-                    continue
-                source[outs[0]] = k
-                self.visit(k, op, parts, timed[k] and not moving[k])
-        self.result.clock = self.curved(column(list(alone.values())))
-        if rows:
-            expression = ca.SX(self.result.expression)
-            for row, new in rows.items():
-                expression[row] = new
-            self.result.expression = expression
-        return self.result
+                symbol = self.written[k].element_hash()
+                for marks, symbols in ((timed, {self.t.element_hash()}), (moving, self.states), (held, self.fixed)):
+                    if symbol in symbols:
+                        marks.add(k)
+                continue
+            for marks in (timed, moving, held):
+                if not marks.isdisjoint(parts):
+                    marks.add(k)
+            if k in moving or k in held:
+                alone |= {i: self.written[i] for i in parts if i in timed and i not in moving and i not in held}
+            if k in timed and k not in moving:
+                self.visit(k, op, parts)
+        ends = {i for row, i in self.rows.items() if row < paced}
+        alone |= {i: self.written[i] for i in ends if i in timed and i not in moving and i not in held}
+        self.outcome.clock = self.curved(column(list(alone.values())))
+        self.outcome.expression = self.result()
+        return self.outcome
 
-    def visit(self, k: int, op: int, parts: list[int], on_time: bool) -> None:
-        """Give instruction k its bit if it is a condition on time, or the changed values that it works on."""
-        if on_time and op in COMPARISONS:
+    def visit(self, k: int, op: int, parts: list[int]) -> None:
+        """Give instruction k, on time, its bit if it is a condition."""
+        if op in COMPARISONS:
             low, high = (self.now(i) for i in parts)
             self.changed[k] = self.bit(high - low, COMPARISONS[op], (op, *parts))
-        elif on_time and op in KINKS:
+        elif op in KINKS:
             values = [self.now(i) for i in parts]
-            self.bit(values[-1] - values[0] if len(values) == 2 else values[0], True, (op, *parts, -1)[:3])
-            self.again(k, op, parts)
-        elif on_time and op == ca.OP_SIGN:
+            self.bit(values[-1] - values[0] if len(values) == 2 else values[0], True, (op, *parts))
+        elif op == ca.OP_SIGN:
             value = self.now(parts[0])
             self.changed[k] = self.bit(value, True, (op, parts[0], 1)) - self.bit(-value, True, (op, parts[0], -1))
-        elif on_time and op in WHOLE:
+        elif op in WHOLE:
             self.changed[k] = self.whole(op, parts)
-        else:
-            self.again(k, op, parts)
-
-    def again(self, k: int, op: int, parts: list[int]) -> None:
-        """The operation on changed values, where any has changed."""
-        if any(i in self.changed for i in parts):
-            values = [self.now(i) for i in parts]
-            self.changed[k] = ca.SX.unary(op, *values) if len(values) == 1 else ca.SX.binary(op, *values)
 
     def whole(self, op: int, parts: list[int]) -> ca.SX:
         """Whole parts of values on time: they jump at every whole number, and are frozen between."""
@@ -146,11 +116,11 @@ class _Walk:
         """The bit that says whether a difference on time is positive."""
         if key not in self.met:
             self.met[key] = ca.SX.sym(f"time{len(self.met)}")
-            self.result.bits.append(self.met[key])
-            self.result.relations.append(difference)
+            self.outcome.bits.append(self.met[key])
+            self.outcome.relations.append(difference)
             parts = [difference.dep(i) for i in range(difference.n_dep())] or [difference]
-            self.result.scales.append(sum((ca.fabs(part) for part in parts), ca.SX(0)))
-            self.result.strict.append(strict)
+            self.outcome.scales.append(sum((ca.fabs(part) for part in parts), ca.SX(0)))
+            self.outcome.strict.append(strict)
         return self.met[key]
 
     def curved(self, alone: ca.SX) -> ca.SX:
