@@ -18,7 +18,7 @@ import pytest
 ROOT = Path(__file__).resolve().parents[1]
 
 LAYERS: tuple[tuple[str, ...], ...] = (
-    ("errors", "files", "symbols", "units", "maths", "compiler", "c_text", "prepared", "columns"),
+    ("errors", "files", "symbols", "units", "maths", "compiler", "c_text", "prepared", "columns", "walk", "time_alone"),
     ("tables", "fluid", "domain", "component", "energy"),
     ("expressions", "yaml_text", "explain", "library", "netlist"),
     ("elaborate",),

@@ -19,6 +19,7 @@ from crescentlab.solvers.diagnosis import Diagnosis
 from crescentlab.solvers.elimination import elimination
 from crescentlab.solvers.functions import Functions
 from crescentlab.solvers.hybrid import ZENO_SPAN, Hybrid
+from crescentlab.solvers.jumps import ROWS, Chatter
 from crescentlab.solvers.limits import PressureLimits
 from crescentlab.solvers.options import ANGLE_STEP, RESTART_SHARE, Options
 from crescentlab.solvers.pace import CLOCK_SWING, clock_pace
@@ -26,6 +27,7 @@ from crescentlab.solvers.promotion import Promotion
 from crescentlab.solvers.records import Records, on_grid
 from crescentlab.solvers.roots import waves
 from crescentlab.solvers.snapshot import Snapshot
+from crescentlab.solvers.storms import STORM_COUNT, STORM_STEPS, Storms
 from crescentlab.solvers.trajectory import Statistics, Trajectory
 from crescentlab.system import System, Values
 
@@ -67,7 +69,7 @@ def integrate(
     """
     run = _CompiledRun(system, values, options, progress)
     if start is not None:
-        run.resume(start)
+        run.hybrid.resume(start)
     return run.run()
 
 
@@ -94,6 +96,10 @@ class _CompiledRun:
         self.atol = options.rtol * system.nominal
         self.diagnosis = Diagnosis(Functions(system, values), options.rtol, self.atol)
         self.limits = PressureLimits(system)
+        self.storms = Storms(system)
+        self.chatter = Chatter(system, values.p)
+        self.chatter_at = FIRST_BLOCK
+        self.chattering: str | None = None
         self.tension: str | None = None
         self.run_ = native.Run()
         self.set_sizes()
@@ -153,16 +159,23 @@ class _CompiledRun:
         r.curved = hybrid.curved.size
         r.curved_held = int(bool(r.curved) and bool(system.bits.held_dependent[hybrid.curved].any()))
         r.curved_next = self.options.start
+        r.give(storm_last=self.storms.last, storm_row=self.storms.row)
+        r.storm_steps, r.storm_count = STORM_STEPS, STORM_COUNT
         r.zeno_span = ZENO_SPAN * self.options.span
         r.last_event = -1
 
-    def resume(self, start: Snapshot) -> None:
-        """Begin where another run ended; its states and held values are the start values already."""
-        r, kept = self.run_, self.run_.kept
-        kept["b"][: r.n_bits] = start.b
-        kept["holds"][: r.n_conditions] = start.holds
-        kept["origin"][: r.n_ticks], kept["ticked"][: r.n_ticks] = start.clocks(self.hybrid.periods, r.tolerance)
-        r.resumed = 1
+    def enter(self) -> None:
+        """Compute the start as for every solver, and let the loop go on from there."""
+        r, kept, hybrid = self.run_, self.run_.kept, self.hybrid
+        x = self.values.x0
+        self.diagnosis.check_finite(r.t, x, self.diagnosis.functions.rhs(r.t, x), "at the start")
+        x, names = hybrid.enter(r.t, x)
+        kept["x"][: r.n], kept["h"][: r.n_held], kept["b"][: r.n_bits] = x, hybrid.h, hybrid.b
+        kept["holds"][: r.n_conditions], r.finished = hybrid.holds, hybrid.finished
+        kept["origin"][: r.n_ticks], kept["ticked"][: r.n_ticks] = hybrid.origin, hybrid.ticked
+        places = {event.name: k for k, event in enumerate(self.system.events)}
+        kept["log_t"][: len(names)], kept["log_event"][: len(names)] = r.t, [places[name] for name in names]
+        r.events = r.logs = len(names)
 
     def end(self) -> Snapshot:
         """Where the run stands."""
@@ -213,6 +226,8 @@ class _CompiledRun:
         begun = self.begun = self.shown_at = time.perf_counter()
         status, error = "done", ""
         try:
+            with np.errstate(all="ignore"):
+                self.enter()
             status = self.advance()
         except SimulationError as problem:
             t = self.run_.t
@@ -250,12 +265,15 @@ class _CompiledRun:
             block = max(1, min(2 * block, MOST_BLOCK, round(block * LOOK / pause)))
             self.hybrid.h, self.hybrid.b = r.kept["h"][: r.n_held].copy(), r.kept["b"][: r.n_bits].copy()
             self.drain()
+            self.warnings += self.storms.look(r.t)
             if code in ("DONE", "STOPPED"):
                 return code.lower()
             if code == "NEEDS_ROOT":
                 self.find_root()
             elif code != "PAUSED":
                 self.fail(code)
+            elif self.chattering:
+                raise SimulationError(self.chattering)
             elif self.records.size > MOST_BYTES:
                 raise SimulationError(
                     f"its {r.steps} steps fill {self.records.size / 1e9:.1f} GB; "
@@ -288,9 +306,14 @@ class _CompiledRun:
         return self.run_.kept["x"][: self.run_.n].copy()
 
     def drain(self) -> None:
-        """Take what was recorded, and look whether fluids that may were under tension."""
+        """Take what was recorded, and look whether fluids that may were under tension, or a choice chatters."""
         block = self.records.drain()
-        if block is None or self.tension:
+        if block is None:
+            return
+        if self.run_.steps >= self.chatter_at:
+            self.chatter_at *= 2
+            self.chattering = self.chattering or self.chatter.look(*self.records.last(ROWS))
+        if self.tension:
             return
         held = block["world_h"][block["row_world"]]
         for rows, kind in ((block["row_x"], self.limits.states), (held, self.limits.held)):
@@ -328,7 +351,8 @@ class _CompiledRun:
         if code == "IMPOSSIBLE_HELD":
             self.limits.check(t, x, hybrid.h)
         self.diagnosis.check_finite(t, x, self.diagnosis.functions.rhs(t, x))
-        raise SimulationError(f"no step is small enough; {self.diagnosis.blame(t, x)}")
+        reason = self.chatter.look(*self.records.last(ROWS), throughout=False) or self.diagnosis.blame(t, x)
+        raise SimulationError(f"no step is small enough; {reason}")
 
     def last_events(self, count: int) -> list[str]:
         """Names of the last events, each once."""
