@@ -8,6 +8,7 @@ from __future__ import annotations
 import ctypes
 import time
 from collections.abc import Callable
+from typing import NoReturn
 
 import numpy as np
 
@@ -94,7 +95,7 @@ class _CompiledRun:
         self.warnings += [notice] if (notice := self.promotion.before()) else []
         self.hybrid = Hybrid(system, values, options.start, options.stop)
         self.atol = options.rtol * system.nominal
-        self.diagnosis = Diagnosis(Functions(system, values), options.rtol, self.atol)
+        self.diagnosis = Diagnosis(Functions(system, values), options.rtol, self.atol, options.solver)
         self.limits = PressureLimits(system)
         self.storms = Storms(system)
         self.chatter = Chatter(system, values.p)
@@ -275,10 +276,7 @@ class _CompiledRun:
             elif self.chattering:
                 raise SimulationError(self.chattering)
             elif self.records.size > MOST_BYTES:
-                raise SimulationError(
-                    f"its {r.steps} steps fill {self.records.size / 1e9:.1f} GB; "
-                    "an implicit solver takes fewer (--solver rodas), or simulate a shorter time"
-                )
+                self.fail_full()
             self.report()
 
     def find_root(self) -> None:
@@ -353,6 +351,16 @@ class _CompiledRun:
         self.diagnosis.check_finite(t, x, self.diagnosis.functions.rhs(t, x))
         reason = self.chatter.look(*self.records.last(ROWS), throughout=False) or self.diagnosis.blame(t, x)
         raise SimulationError(f"no step is small enough; {reason}")
+
+    def fail_full(self) -> NoReturn:
+        """End a run whose records have grown too large."""
+        limited = self.run_.kept["limited"][: self.run_.n]
+        most = f", most of them limited by {self.system.state_names[int(np.argmax(limited))]}," if limited.any() else ""
+        advice = "take an implicit solver (--solver rodas)" if self.options.solver == "dopri" else "take a larger rtol"
+        raise SimulationError(
+            f"its {self.run_.steps} steps{most} fill {self.records.size / 1e9:.1f} GB; "
+            f"{advice}, or simulate a shorter time"
+        )
 
     def last_events(self, count: int) -> list[str]:
         """Names of the last events, each once."""

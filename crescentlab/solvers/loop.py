@@ -80,7 +80,7 @@ class _Run:
         self.hybrid = Hybrid(system, values, options.start, options.stop, self.promotion.take)
         self.roots = RootFinder(self.hybrid)
         self.atol = options.rtol * system.nominal
-        self.diagnosis = Diagnosis(self.functions, options.rtol, self.atol)
+        self.diagnosis = Diagnosis(self.functions, options.rtol, self.atol, options.solver)
         self.stepper: Stepper = stepper(options.solver, self.functions, options.rtol, self.atol)
         self.statistics = Statistics()
         self.steps = Recording()
