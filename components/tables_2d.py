@@ -10,8 +10,8 @@ from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, ValidationIn
 from pydantic_core import PydanticCustomError
 
 from crescentlab.component import Component, Equations
-from crescentlab.domain import gives_signal, takes_signal
 from crescentlab.data_files import open_data, whole
+from crescentlab.domain import gives_signal, takes_signal
 from crescentlab.errors import InputError
 from crescentlab.maths import Expr
 from crescentlab.units import Quantity, parse_any, ratio

@@ -135,6 +135,6 @@ def read_csv(path: Path, x: Quantity | None = None, y: Quantity | None = None, *
             if not cell:
                 raise InputError(f"the cell in the column {name!r} is empty", place)
     try:
-        return _curve(values[0].tolist(), values[1].tolist(), *quantities, jumps, table.places)
+        return _curve(values[0].tolist(), values[1].tolist(), quantities[0], quantities[1], jumps, table.places)
     except InputError as error:
         raise error.at(table.top) from None

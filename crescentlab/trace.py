@@ -128,8 +128,6 @@ class Trace:
     events: tuple[EventInfo, ...]
     condition: ca.Function
     period: ca.Function
-    clock: ca.Function
-    """Values inside the equations that depend on time alone."""
     books: ca.Function
     """Five rows of the ledger of energy, or none; see :func:`crescentlab.energy.books`."""
 
@@ -292,11 +290,6 @@ class _Tracing:
             {k.removeprefix("der_"): v for k, v in returned.items() if k.startswith("der_")}, self.states
         )
         observable = self.column(shown, self.observables)
-        clock = (
-            _time_only(ca.vertcat(derivative, y, *relations), self.t, ca.vertcat(self.x, self.h, b, self.u))
-            if "t" in self.cls.asks_for()
-            else ca.SX(0, 1)
-        )
         return Trace(
             self.cls, self.states, self.held, self.inputs, self.outputs, self.observables, self.parameters,
             self.fluid_names,
@@ -304,7 +297,7 @@ class _Tracing:
             tuple(infos),
             function("rel", ca.horzcat(column(relations), column(scales))), tuple(events),
             function("cond", column(conditions)),
-            function("period", column(periods)), function("clock", clock),
+            function("period", column(periods)),
             function("books", ca.cse(books(self.cls, shown, entering))),
         )  # fmt: skip
 
@@ -388,48 +381,6 @@ def _symbols(slots: Iterable[Slot]) -> ca.SX:
 def _text(relation: Relation) -> str:
     text = f"{relation.lhs.sx} {relation.operator} {relation.rhs.sx}"
     return text if len(text) < 80 else f"a relation {relation.operator}"
-
-
-def _time_only(value: ca.SX, t: ca.SX, others: ca.SX) -> ca.SX:
-    """The largest subexpressions of ``value`` that depend on t, in a curve, and on none of ``others``.
-
-    Walks the instructions once, marking each result by what it depends on.
-    """
-    free = list(ca.symvar(value))
-    walk = ca.Function("walk", free, [value])
-    names = [s.name() for s in free]
-    other_names = {s.name() for s in ca.symvar(others)}
-    kinds = {k: (1 if names[k] == "t" else 2 if names[k] in other_names else 0) for k in range(len(free))}
-    work: dict[int, int] = {}
-    expressions: dict[int, ca.SX] = {}
-    found: list[ca.SX] = []
-    for k in range(walk.n_instructions()):
-        op, ins, outs = walk.instruction_id(k), walk.instruction_input(k), walk.instruction_output(k)
-        if op == ca.OP_INPUT:
-            work[outs[0]], expressions[outs[0]] = kinds[ins[0]], free[ins[0]]
-        elif op == ca.OP_CONST:
-            work[outs[0]], expressions[outs[0]] = 0, ca.SX(walk.instruction_constant(k))
-        elif op == ca.OP_OUTPUT:
-            if work[ins[0]] == 1:
-                found.append(expressions[ins[0]])
-        else:
-            mark = max(work[i] for i in ins)
-            if mark == 2:
-                found += [expressions[i] for i in ins if work[i] == 1]
-            elif mark == 1:
-                values = [expressions[i] for i in ins]
-                expressions[outs[0]] = (
-                    ca.SX.unary(op, values[0]) if len(values) == 1 else ca.SX.binary(op, values[0], values[1])
-                )
-            work[outs[0]] = mark
-            if mark == 0:
-                values = [expressions.get(i, ca.SX(0)) for i in ins]
-                expressions[outs[0]] = (
-                    ca.SX.unary(op, values[0]) if len(values) == 1 else ca.SX.binary(op, values[0], values[1])
-                )
-    alone = column(found)
-    curved = ca.which_depends(alone, t, 2, True) if found else []
-    return column([alone[k] for k, bent in enumerate(curved) if bent])  # a straight line swings never
 
 
 def quantities(component: Component, kind: type[State] | type[Held] | type[Observable]) -> dict[str, Quantity]:

@@ -175,7 +175,7 @@ def test_a_spline_that_repeats_is_that_of_scipy():
 def test_a_characteristic_that_repeats(solver: str, interpolation: str):
     """A cam of lift over angle, turned forwards and back through five periods: u = 10 sin t, against y(u mod 2).
 
-    An explicit method steps over the spline's knots, where only its third derivative jumps: it loses a few digits there.
+    An explicit method steps over the spline's knots, where only its third derivative jumps, and loses a few digits.
     """
     x, y = [0.0, 0.5, 1.5, 2.0], [0.0, 1.0, 0.4, 0.0]
     cam = {"type": "table", "curve": {"x": x, "y": y}, "interpolation": interpolation, "beyond": "repeat"}

@@ -11,8 +11,8 @@ import numpy as np
 
 from crescentlab.analysis.outcome import Outcome
 from crescentlab.circuit import Circuit, load
-from crescentlab.errors import InputError, Place, UnitError, nearest
 from crescentlab.data_files import Table, read_table
+from crescentlab.errors import InputError, Place, UnitError, nearest
 from crescentlab.studies.fit_file import FitFile, ParameterSection, read_fit_file
 from crescentlab.studies.fit_scales import Data, Scale
 from crescentlab.studies.fitting import too_few
