@@ -18,21 +18,8 @@ import pytest
 ROOT = Path(__file__).resolve().parents[1]
 
 LAYERS: tuple[tuple[str, ...], ...] = (
-    (
-        "errors",
-        "files",
-        "symbols",
-        "units",
-        "maths",
-        "compiler",
-        "c_text",
-        "prepared",
-        "columns",
-        "walk",
-        "time_alone",
-        "schedule",
-    ),
-    ("data_files", "tables", "fluid", "domain", "component", "energy"),
+    ("errors", "files", "symbols", "units", "maths", "compiler", "c_text", "prepared", "columns", "schedule"),
+    ("walk", "time_alone", "data_files", "tables", "fluid", "domain", "component", "energy"),
     ("expressions", "yaml_text", "explain", "library", "netlist"),
     ("elaborate",),
     ("graph", "trace", "contract"),
