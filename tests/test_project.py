@@ -25,7 +25,7 @@ LAYERS: tuple[tuple[str, ...], ...] = (
     ("graph", "trace", "contract"),
     ("causality",),
     ("system",),
-    ("assembly",),
+    ("assembly", "closed_sets"),
     ("solvers",),
     ("balance",),
     ("result", "placement", "plotting", "schematic"),
