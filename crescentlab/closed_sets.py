@@ -47,13 +47,13 @@ class ClosedSet:
 class ClosedSets:
     """The closed sets of a circuit at the points it is asked about."""
 
-    def __init__(self, system: System, p: Array, key: str, y: ca.SX, h: ca.SX | None = None) -> None:
-        """``y``: symbols of the unknowns, told from others by ``key``; ``h``: the held values in terms of them."""
+    def __init__(self, system: System, p: Array, places: Array) -> None:
+        """The unknowns y have these ``places`` among states and held values, one after the other."""
         self.names = list(system.contents())
         if not self.names:
             return
-        make = functools.partial(_flows, system, y, system.h if h is None else h)
-        stored, flows, function = system.once(f"closed sets {key}", make)
+        make = functools.partial(_flows, system, places)
+        stored, flows, function = system.once(f"closed sets {places.tolist()}", make)
         self._stored, self._flows = empty_matrix(stored), empty_matrix(flows)
         self._evaluator = Evaluator(function, p)
         self._sets: dict[bytes, list[Array]] = {}
@@ -108,16 +108,14 @@ class ClosedSets:
 def closed_sets(system: System, p: Array) -> ClosedSets:
     """Those of a run: states and held values are the unknowns, but for what only counts."""
     moving = np.concatenate([~system.counting_states, ~system.counting_held])
-    y = ca.vertcat(system.x, system.h)[np.flatnonzero(moving).tolist()] if moving.any() else ca.SX(0, 1)
-    return ClosedSets(system, p, "of a run", y)
+    return ClosedSets(system, p, np.flatnonzero(moving))
 
 
-def _flows(system: System, y: ca.SX, h: ca.SX) -> tuple[ca.Sparsity, ca.Sparsity, object]:
+def _flows(system: System, places: Array) -> tuple[ca.Sparsity, ca.Sparsity, object]:
     """Sparsities of dC/dy and dq/dy, and the function giving C, q, the sizes of q and the nonzeros of both."""
     contents = system.contents()
     columns = [ca.densify(ca.vertcat(*(c[k] for c in contents.values()))) for k in range(3)]
-    if h is not system.h:
-        columns = list(ca.Function("columns", system.arguments, columns)(system.t, system.x, h, system.b, system.p))
+    y = ca.vertcat(system.x, system.h)[places.tolist()] if places.size else ca.SX(0, 1)
     stored, flows = jacobian(columns[0], y), jacobian(columns[1], y)
     outputs = [*columns, nonzeros(stored), nonzeros(flows)]
     return stored.sparsity(), flows.sparsity(), prepare("ledger", system.arguments[:-1], system.p, outputs)

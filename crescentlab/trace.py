@@ -166,22 +166,29 @@ class _Bits:
     def __init__(self) -> None:
         self.symbols: list[ca.SX] = []
         self.relations: list[Relation] = []
+        self.halvings: dict[tuple[int, bytes], tuple[ca.SX, list[ca.SX]]] = {}
+        self.alike: dict[Any, list[tuple[ca.SX, ca.SX]]] = {}
+        """Differences of the sides, and their bits, of relations whose operator, shape and outermost terms agree."""
 
     def bit(self, relation: Relation) -> ca.SX:
-        difference = relation.lhs - relation.rhs
-        for known, symbol in zip(self.relations, self.symbols, strict=True):
-            same = known.lhs - known.rhs
-            if (
-                known.operator == relation.operator
-                and same.shape == difference.shape
-                and ca.is_equal(same.sx, difference.sx, 8)
-            ):
+        difference = (relation.lhs - relation.rhs).sx
+        ends = [_outline(difference[k]) for k in {0, difference.numel() - 1}]
+        known = self.alike.setdefault((relation.operator, relation.shape, *ends), [])
+        for same, symbol in known:
+            if ca.is_equal(same, difference, 8):
                 return symbol
-        n = relation.shape[0] if relation.shape else 1
-        symbol = ca.SX.sym(f"b{len(self.symbols)}", n)
+        symbol = ca.SX.sym(f"b{len(self.symbols)}", relation.shape[0] if relation.shape else 1)
         self.symbols.append(symbol)
         self.relations.append(relation)
+        known.append((difference, symbol))
         return symbol
+
+
+def _outline(term: ca.SX, depth: int = 3) -> Any:
+    """Operations, symbols and constants of a term down to a depth: what differs here is not equal."""
+    if term.is_leaf():
+        return float(term) if term.is_constant() else term.element_hash()
+    return (term.op(), *(_outline(term.dep(k), depth - 1) for k in range(term.n_dep()) if depth))
 
 
 def trace(component: Component, fluids: dict[str, Fluid]) -> Trace:

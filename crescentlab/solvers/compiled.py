@@ -106,6 +106,7 @@ class _CompiledRun:
         self.set_sizes()
         self.set_functions()
         self.set_relations_and_events()
+        self.set_schedules()
         self.set_task()
         self.set_scratch()
         self.records = Records(self.run_, options.solver)
@@ -164,6 +165,23 @@ class _CompiledRun:
         r.storm_steps, r.storm_count = STORM_STEPS, STORM_COUNT
         r.zeno_span = ZENO_SPAN * self.options.span
         r.last_event = -1
+
+    def set_schedules(self) -> None:
+        """What follows a schedule: all rows one below the other."""
+        r, following = self.run_, self.hybrid.following
+        schedules = [schedule for _, schedule in following]
+        sizes = np.array([schedule.times.size for schedule in schedules], dtype=int)
+        first = np.cumsum(sizes) - sizes
+        at = [schedule.at(self.options.start, self.hybrid.time_tolerance) for schedule in schedules]
+        r.n_schedules, r.schedule_width = len(schedules), max((s.rows.shape[1] for s in schedules), default=0)
+        rows = [np.pad(s.rows, ((0, 0), (0, r.schedule_width - s.rows.shape[1]))) for s in schedules]
+        r.give(
+            schedule_times=_real(np.concatenate([np.zeros(0), *(s.times for s in schedules)])),
+            schedule_rows=_real(np.concatenate([np.zeros((0, r.schedule_width)), *rows])),
+            schedule_at=_whole(first + np.array(at, dtype=int)), schedule_last=_whole(first + sizes - 1),
+            schedule_place=_whole([places.start for places, _ in following]),
+            schedule_size=_whole([places.stop - places.start for places, _ in following]),
+        )  # fmt: skip
 
     def enter(self) -> None:
         """Compute the start as for every solver, and let the loop go on from there."""

@@ -86,6 +86,7 @@ class Hybrid:
         self.curved = np.flatnonzero(system.bits.on_time & ~system.bits.linear)
         self.linear = np.flatnonzero(system.bits.linear)
         self.curved_roots: list[float] = []
+        self.following = [(f.places, f.schedule(start, stop)) for f in values.following]
         self.chunk = self.span / SCAN_CHUNKS
         """Length of time that is scanned at once."""
         self.scanned: float | None = None
@@ -161,7 +162,11 @@ class Hybrid:
         return np.where(inside & moving, rate > 0, self.truth(g)), rate
 
     def settle(self, t: float, x: np.ndarray) -> None:
-        """Bring every bit to rest; raises :class:`SimulationError` naming relations that cannot."""
+        """Bring every bit to rest; raises :class:`SimulationError` naming relations that cannot.
+
+        Before, what follows a schedule takes the row of this instant.
+        """
+        self.follow(t)
         if not self.n:
             return
         seen: dict[bytes, int] = {}
@@ -177,6 +182,15 @@ class Hybrid:
             self.b = new
             self.rescan()
         raise SimulationError("the relations do not settle")
+
+    def follow(self, t: float) -> None:
+        """Let held values that follow a schedule take the row that holds from now on."""
+        for places, schedule in self.following:
+            row = schedule.rows[schedule.at(t, self.time_tolerance)]
+            if not np.array_equal(self.h[places], row):
+                self.h = self.h.copy()
+                self.h[places] = row
+                self.rescan()
 
     # -- stops -----------------------------------------------------------------------------------
 
@@ -293,8 +307,8 @@ class Hybrid:
         return [int(k) for k in hit]
 
     def next_time_root(self, t: float, x: np.ndarray) -> float:
-        """Earliest instant after ``t`` at which a relation on time alone turns, or infinity."""
-        soonest = np.inf
+        """Earliest instant after ``t`` at which a relation on time alone turns or a schedule goes on, or infinity."""
+        soonest = min((schedule.after(t, self.time_tolerance) for _, schedule in self.following), default=np.inf)
         if self.linear.size:
             g, rate, _ = self.relation(t, x)
             for k in self.linear:

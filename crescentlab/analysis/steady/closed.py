@@ -10,6 +10,8 @@ C_j [m^3] fluid stored by component j, by its own law; C_j^0 at the start. Nothi
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from crescentlab.analysis.steady.rest import Point, Site
@@ -23,8 +25,7 @@ class Ledger:
 
     def __init__(self, site: Site) -> None:
         self.site = site
-        key = f"at rest {site.equations.held.tolist()}"
-        self.sets = ClosedSets(site.system, site.values.p, key, site.equations.y)
+        self.sets = ClosedSets(site.system, site.values.p, site.equations.places)
         self.names = self.sets.names
         self.kept = np.zeros(len(self.names))
 
@@ -42,11 +43,15 @@ class Ledger:
             self.kept = self.kept + self.contents(after) - self.contents(before)
 
     def closed(self, point: Point) -> list[ClosedSet]:
-        """Sets that no fluid leaves or enters.
+        """Sets that no fluid leaves or enters, their slopes by the unknowns.
 
         Contents of components in no closed set are taken over as those to keep once they are closed in.
         """
-        found = self.sets.closed(self.site.t, point.x, point.h, point.b)
+        own = self.site.equations.own
+        found = [
+            replace(each, slope=np.bincount(own, each.slope, minlength=self.site.nominal.size))
+            for each in self.sets.closed(self.site.t, point.x, point.h, point.b)
+        ]
         if self.names:
             shut = np.isin(np.arange(len(self.names)), [k for each in found for k in each.members])
             self.kept = np.where(shut, self.kept, self.contents(point))

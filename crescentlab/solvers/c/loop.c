@@ -123,6 +123,19 @@ static void turned(Run *r, int64_t k)
     if (r->storm_row[k] < r->storm_count) r->storm_row[k] = close ? r->storm_row[k] + 1 : 0;
 }
 
+/* Let held values that follow a schedule take the row that holds from now on. */
+static void follow(Run *r)
+{
+    for (int64_t k = 0; k < r->n_schedules; k++) {
+        int64_t at = r->schedule_at[k];
+        while (at < r->schedule_last[k] && r->schedule_times[at + 1] <= r->t + r->tolerance) at++;
+        if (at == r->schedule_at[k]) continue;
+        r->schedule_at[k] = at;
+        memcpy(r->h + r->schedule_place[k], r->schedule_rows + at * r->schedule_width, r->schedule_size[k] * sizeof *r->h);
+        now_switched(r);
+    }
+}
+
 /* Bring every bit to rest. A relation's tolerance is that of its fastest rate met on the way: a rate that depends on the
  * bit itself would else put it inside its tolerance with one value and outside with the other. */
 static int settle(Run *r, int onward)
@@ -271,6 +284,8 @@ void find_goal(Run *r)
 {
     double goal = r->stop;
     for (int64_t k = 0; k < r->n_ticks; k++) goal = fmin(goal, r->origin[k] + (r->ticked[k] + 1) * r->period[k]);
+    for (int64_t k = 0; k < r->n_schedules; k++)
+        if (r->schedule_at[k] < r->schedule_last[k]) goal = fmin(goal, r->schedule_times[r->schedule_at[k] + 1]);
     for (int64_t j = 0; j < r->n_linear; j++) {
         const int64_t k = r->time_linear[j];
         const double ahead = -r->g[k] / r->g_rate[k];
@@ -312,13 +327,14 @@ static int f_changed(const Run *r, const double *old)
 static int stop_here(Run *r, int start, int landed)
 {
     const int64_t ticks = r->ticks;
-    const int only_ticks = !start && !landed && !r->n_linear && !r->curved;
+    const int only_ticks = !start && !landed && !r->n_linear && !r->n_schedules && !r->curved;
     for (int64_t k = 0; k < r->n_ticks; k++)
         if (r->origin[k] + (r->ticked[k] + 1) * r->period[k] <= r->t + r->tolerance) r->due[k] = 1, r->ticked[k]++;
     if (r->curved && r->curved_next <= r->t + r->tolerance) r->rescan = 1;
     r->jumped = 0;
     r->last_event = -1;
     if (start) r->switched = 1; /* the first world is that after the start */
+    follow(r);
     int code = fire(r, only_ticks);
     if (!code && only_ticks && r->ticks == ticks) rhs(r, r->t, r->x); /* the end of the run */
     const int changed = r->jumped || r->switched;

@@ -23,6 +23,7 @@ typedef struct Run {
     int64_t n_linear; /* relations linear in time */
     int64_t n_angles; /* states that are angles */
     int64_t n_pace; /* points of the pace, 0 without one */
+    int64_t n_schedules; /* held vectors that follow a schedule */
 
     /* functions of the system, and how to call one: trigger(function) */
     void *trigger; /* void (*)(void *) */
@@ -73,6 +74,13 @@ typedef struct Run {
     int64_t *ticked; /* (n_ticks) */
     int64_t *due; /* (n_ticks) */
     int64_t *angles; /* (n_angles) states */
+    double *schedule_times; /* (rows of all schedules) from when on each row holds */
+    double *schedule_rows; /* (rows of all schedules, schedule_width) */
+    int64_t schedule_width; /* of the widest */
+    int64_t *schedule_at; /* (n_schedules) present row */
+    int64_t *schedule_last; /* (n_schedules) last row */
+    int64_t *schedule_place; /* (n_schedules) first place among the held values */
+    int64_t *schedule_size; /* (n_schedules) number of places */
     int64_t curved; /* relations that curve in time: Python finds their roots */
     int64_t curved_held; /* whether those depend on held values or bits */
     double curved_next; /* the next of their roots */
