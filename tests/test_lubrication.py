@@ -44,7 +44,7 @@ def oil(p: float) -> Oil:
 
 
 def lands(diameter: float, clearance: float, land: float, eccentricity: float) -> float:
-    """Flow over drop [m^3/(s Pa)], pi r c^3 (1 + 1.5 eps^2)/(3 nu l rho_0), of a bearing of two lands; lengths in mm."""
+    """Flow over drop [m^3/(s Pa)], pi r c^3 (1 + 1.5 eps^2)/(3 nu l rho_0), of a bearing of two lands; sizes in mm."""
     volume = math.pi * diameter / 2 * clearance**3 * (1 + 1.5 * eccentricity**2) / (3 * land) * 1e-9
     return volume / (NU * 790 * 0.98)
 
