@@ -48,15 +48,17 @@ class Jet(BaseModel):
     def jet(self, p_a: Any, p_b: Any, area: Any, hydraulic_diameter: Any, cosine: Any, fluid: Fluid) -> "Issue":
         r"""What passes an edge, and the momentum of the jet along the axis.
 
-        .. math:: q = C_d A v_{jet}, \quad F = k \rho |q| v_{jet} \cos\vartheta, \quad v_{jet} = \sqrt{2|\Delta p|/\rho}
+        .. math:: \rho_0 q = \rho\, C_d A v_{jet}, \quad F = k \rho_0 |q| v_{jet} \cos\vartheta, \quad
+                  v_{jet} = \sqrt{2|\Delta p|/\rho}
 
-        A = `area` [m^2]; `cosine` = cos \vartheta [-] of the jet's angle to the axis; k = `jet_coefficient` [-].
+        \rho_0 q [kg/s] the mass flow; A = `area` [m^2]; `cosine` = cos \vartheta [-] of the jet's angle to the axis; k
+        = `jet_coefficient` [-].
         """
-        rho = fluid.density((p_a + p_b) / 2)
-        speed = orifice_flow(p_a, p_b, 1.0, hydraulic_diameter, self.cd_max, self.lambda_c, fluid)
-        q, rounded = area * speed, hypot(p_a - p_b, self.drop_rounding)
-        jet_velocity = (p_a - p_b) * sqrt(2 / (rho * rounded))
-        return Issue(q, self.jet_coefficient * rho * q * jet_velocity * cosine, rho * speed)
+        through_unit = orifice_flow(p_a, p_b, 1.0, hydraulic_diameter, self.cd_max, self.lambda_c, fluid)
+        q, rounded = area * through_unit, hypot(p_a - p_b, self.drop_rounding)
+        jet_velocity = (p_a - p_b) * sqrt(2 / (fluid.density((p_a + p_b) / 2) * rounded))
+        force = self.jet_coefficient * fluid.rho_0 * q * jet_velocity * cosine
+        return Issue(q, force, fluid.rho_0 * through_unit)
 
 
 @dataclass(frozen=True)
@@ -108,9 +110,10 @@ class SpoolEdge(Jet):
     def issued(self, uncovered: Uncovered, p_a: Any, p_b: Any, v_rod: Any, fluid: Fluid) -> dict[str, Any]:
         r"""What every edge returns, from what it has uncovered.
 
-        .. math:: F_t = L \rho \frac{q}{A} \frac{dA}{dx} v
+        .. math:: F_t = L \rho_0 \frac{q}{A} \frac{dA}{dx} v
 
-        F_t [N] the transient flow force; L = `damping_length` [m]; v = `v_rod` [m/s]; q/A goes on where A is 0.
+        F_t [N] the transient flow force; \rho_0 q [kg/s] the mass flow; L = `damping_length` [m]; v = `v_rod` [m/s];
+        q/A goes on where A is 0.
         """
         issue = self.jet(p_a, p_b, uncovered.area, uncovered.hydraulic_diameter, cos(self.jet_angle), fluid)
         transient = self.damping_length * issue.mass_flux * uncovered.slope * v_rod

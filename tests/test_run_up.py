@@ -74,7 +74,7 @@ def density_ratio(p: float) -> float:
 
 def oil(p: float) -> Oil:
     """The oil at a pressure [Pa]."""
-    return Oil(860 * 0.995 * density_ratio(p), 35e-6)
+    return Oil(860 * 0.995 * density_ratio(p), 860 * 0.995, 35e-6)
 
 
 def header() -> str:

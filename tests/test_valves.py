@@ -236,7 +236,7 @@ def test_rectifier_of_ideal_check_valves() -> None:
     """Four in a bridge turn a flow that swings round into one that does not: |q| at every instant."""
     valve = IdealCheckValve()
     for drop in (-3 * BAR, -1.0, 0.0, 1.0, 3 * BAR):
-        there = valve.equations(p_a=drop, p_b=0.0)["q"]
-        back = valve.equations(p_a=0.0, p_b=drop)["q"]
-        assert there + back == pytest.approx(1e-7 * abs(drop), rel=1e-12)
+        there = valve.equations(p_a=drop, p_b=0.0, fluid=STIFF)["q"]
+        back = valve.equations(p_a=0.0, p_b=drop, fluid=STIFF)["q"]
+        assert there + back == pytest.approx(1e-7 * abs(drop), rel=1e-9)
         assert min(there, back) == 0.0

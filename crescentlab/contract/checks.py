@@ -13,7 +13,7 @@ from pydantic import ValidationError
 from crescentlab import units
 from crescentlab.component import Component
 from crescentlab.contract.case import USUAL_PRESSURE, Case, Values
-from crescentlab.domain import HYDRAULIC, SIGNAL, Held, Observable, Port, State
+from crescentlab.domain import HYDRAULIC, SIGNAL, TRANSLATIONAL, Held, Observable, Port, State
 from crescentlab.energy import power_ports
 from crescentlab.fluid import Fluid
 from crescentlab.trace import Layout
@@ -184,15 +184,15 @@ ROUNDING = 1e-7
 def check_energy(case: Case) -> None:
     """What enters is stored, supplied from outside or lost: dE/dt = sum P + P_s - P_d; and losses are not negative.
 
-    Where volume is converted to mass (a piston, a displacement machine) at one density, without a store for what the
-    fluid is compressed by, as much as p/beta of the power may seem to come from nowhere. Losses of parts that store a
+    Where a piston's volume is converted to mass at one density, without a store for what the fluid is compressed by, as
+    much as p/beta of the power may seem to come from nowhere. Losses of parts that store a
     fluid's energy may have either sign: a line books there what its momentum leaves out, v/a of the motion's power.
     """
     made, symbols = case.made, case.symbols()
     energy, loss, supply, entering, size = ca.vertsplit(made.books(*symbols))
     function = ca.Function("e", symbols, [ca.vertcat(_rate(case, symbols, energy), loss, supply, entering, size)])
     domains = {p.domain for p in power_ports(case.cls)}
-    converts, in_fluid = len(domains) > 1, HYDRAULIC in domains and bool(case.stored)
+    converts, in_fluid = TRANSLATIONAL in domains, HYDRAULIC in domains and bool(case.stored)
     zero: Any = 0.0
     compressed = USUAL_PRESSURE / case.fluid.bulk_modulus(zero) if converts and case.fluid is not None else 0.0
     for values in _switched(case):
