@@ -9,7 +9,7 @@ from typing import Any, Literal
 from pydantic import BaseModel, Field
 
 from crescentlab.fluid import Fluid
-from crescentlab.maths import cos, hypot, maximum, minimum, pi, sqrt, when, where
+from crescentlab.maths import cos, hypot, maximum, minimum, not_, pi, sqrt, when, where
 from crescentlab.units import Angle, Area, Length, Pressure, Ratio
 
 from .flow_laws import DIAMETER_ROUNDING, hydraulic_diameter_of, orifice_flow
@@ -175,7 +175,7 @@ def _rounded(y: Any, w: Any) -> Any:
     return bend * bend / (4 * w) + maximum(y - w, 0.0)
 
 
-def clipped(value: Any, low: float = 0.0, high: Any = 1.0) -> Any:
+def clipped(value: Any, low: Any = 0.0, high: Any = 1.0) -> Any:
     """`value` within low and high."""
     return minimum(maximum(value, low), high)
 
@@ -199,4 +199,24 @@ def follower(
         "hits_low": when(free & (position < low), position=low, rate=0.0, at=-1.0),
         "hits_high": when(free & (position > 1.0), position=1.0, rate=0.0, at=1.0),
         "leaves": when((at == -1) & (target > low) | (at == 1) & (target < 1.0), at=0.0),
+    }
+
+
+def lagging(name: str, position: Any, at: Any, target: Any, time_constant: Any, low: Any = 0.0) -> dict[str, Any]:
+    r"""Derivative and events of the state `name`, at `position` [-], of a driven moving part without mass.
+
+    .. math:: T \frac{dx}{dt} = x_t - x, \quad x_{low} \le x \le 1
+
+    x_t = `target` [-], which may lie beyond the stops, where it pushes all the more; T = `time_constant` [s]. At a stop
+    it rests until the target leads away from it. at: -1 rests on the low stop, 1 on the high one, 0 free, -2 until the
+    start is looked at, which is put between the stops. Hitting and leaving a stop look at one relation from both sides,
+    so that no instant sees both.
+    """
+    free, above, below = at == 0, target > low, target < 1.0
+    return {
+        f"der_{name}": where(free, (target - position) / time_constant, 0.0),
+        "starts": when(at == -2, **{name: clipped(position, low)}, at=0.0),
+        "hits_low": when(free & (position < low) & not_(above), **{name: low}, at=-1.0),
+        "hits_high": when(free & (position > 1.0) & not_(below), **{name: 1.0}, at=1.0),
+        "leaves": when((at == -1) & above | (at == 1) & below, at=0.0),
     }

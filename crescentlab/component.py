@@ -127,6 +127,10 @@ class Component(BaseModel):
             raise ComponentError(f"{type(self).__name__}: size {value!r} is not a whole number from 0")
         return int(value)
 
+    def remarks(self, stop: float) -> list[str]:
+        """Sentences that `check` adds about this part in a run until ``stop`` [s]; a class says what is worth one."""
+        return []
+
     def quantity(self, quantity: Quantity | str) -> Quantity:
         """A declared quantity, looked up in this component's field where it is named by one."""
         return units.quantity_named(str(getattr(self, quantity))) if isinstance(quantity, str) else quantity

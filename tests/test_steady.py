@@ -21,6 +21,7 @@ from crescentlab.analysis.steady import steady
 from crescentlab.analysis.steady.newton import DENSE
 from crescentlab.circuit import Circuit
 from crescentlab.cli import main
+from crescentlab.closed_sets import closed_sets
 from crescentlab.commands.steady import summary
 from crescentlab.component import Component
 from crescentlab.domain import held, state
@@ -530,6 +531,22 @@ def test_two_flows_that_contradict_each_other_are_named():
     nets = {"one": ["feed.port", "a.port", "hole.a"], "two": ["drain.port", "b.port", "hole.b"]}
     with pytest.raises(SimulationError, match=r"the flow of 2 L/min into a, b has no way out"):
         steady(of(parts, nets, simulation={"stop": "10 ms"}))
+
+
+def test_a_run_can_be_asked_for_flows_without_a_way_out():
+    """The same words at any point of a run: nothing while the hole is open, both volumes once nothing leaves them."""
+    parts = {"feed": {"type": "flow_source", "flow": "3 L/min"}, "a": {"type": "capacity", "volume": "70 cm^3"},
+             "hole": HOLE, "b": {"type": "capacity", "volume": "30 cm^3"}}  # fmt: skip
+    shut = {"one": ["feed.port", "a.port", "hole.a"], "two": ["b.port", "hole.b"]}
+
+    def clauses(run: Circuit) -> list[str]:
+        result = run.simulate("10 ms")
+        at, system = result.trajectory.end, run.assembled(run.design())
+        assert at is not None
+        return closed_sets(system, result.values.p).without_way_out(at.t, at.x, at.h, at.b)
+
+    assert clauses(of(parts, shut)) == ["the flow of 3 L/min into a, b has no way out"]
+    assert clauses(throttled({"type": "flow_source", "flow": "3 L/min"})) == []
 
 
 def test_absolute_zero_is_no_operating_point():

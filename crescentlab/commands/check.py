@@ -56,6 +56,11 @@ def facts(plan: Plan) -> dict[str, Any]:
         "states": _names(plan, "states"), "held": _names(plan, "held"),
         "relations": sum(len(tr.relations) for tr in plan.traces.values()),
         "events": events,
+        "remarks": [
+            f"{name}: {said}"
+            for name, component in plan.components.items()
+            for said in component.remarks(netlist.sections.simulation.stop)
+        ],
         "forms": {name: type(c).type_name() for name, c in plan.components.items() if name in flexible},
     }  # fmt: skip
 
@@ -114,6 +119,7 @@ def told(plan: Plan, found: dict[str, Any]) -> str:
         f"  events      {', '.join(events)}, from {counted(found['relations'], 'relation')}",
     ]
     lines += [f"  form        {name} is {form}: {_ends(plan, name)}" for name, form in found["forms"].items()]
+    lines += [wrapped("  remark      ", said) for said in found["remarks"]]
     rows = list(_rows(plan, found["nets"]))
     return "\n".join([*lines, "", table([("net", "domain", "given by", "taken by"), *rows], indent="  ", fold=True)])
 

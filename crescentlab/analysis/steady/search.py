@@ -20,8 +20,9 @@ from crescentlab.analysis.steady.pseudo_transient import PseudoTransient
 from crescentlab.analysis.steady.rest import Point, Site
 from crescentlab.analysis.steady.stability import stability
 from crescentlab.analysis.steady.timing import changing
-from crescentlab.analysis.steady.unrest import check_drift, resisting, some
+from crescentlab.analysis.steady.unrest import check_drift, resisting
 from crescentlab.circuit import Circuit, Start, snapshot_of
+from crescentlab.closed_sets import some
 from crescentlab.elaborate import Design
 from crescentlab.errors import InputError, SimulationError, UnitError
 from crescentlab.result import Result
