@@ -38,14 +38,14 @@ class Lagging(BaseModel):
 class ReliefValve(Lagging, Metering, Component):
     r"""Relief valve: static characteristic with a first-order lag.
 
-    .. math:: q = C_d\, s A \sqrt{2|\Delta p|/\rho}\, \mathrm{sign}\,\Delta p, \quad
+    .. math:: q = C_d\, s A \sqrt{2\rho|\Delta p|}/\rho_0\, \mathrm{sign}\,\Delta p, \quad
               T \frac{ds}{dt} = \frac{\Delta p - p_c}{p_r} - s, \quad 0 \le s \le 1
 
     \Delta p = p_a - p_b [Pa]; p_c = `cracking_pressure`, p_r = `opening_range` [Pa]; s = `lift` [-]; A = `area` [m^2];
-    T = `time_constant` [s]; C_d [-] follows the flow number as in `orifice`; \rho [kg/m^3] at the mean pressure.
-    At rest it passes q at \Delta p = p_c + s p_r. The poppet rests on its seat, and on its stop at s = 1, until the
-    pressure leads it away. Not for the valve's own oscillations (`second_order_relief_valve`, of which this is the limit
-    of much damping, T = 2 \zeta/\omega), nor for flow forces, which `opening_range` may contain.
+    T = `time_constant` [s]; C_d [-] follows the flow number as in `orifice`; \rho [kg/m^3] at the mean pressure. At
+    rest it passes q at \Delta p = p_c + s p_r. The poppet rests on its seat, and on its stop at s = 1, until the
+    pressure leads it away. Not for the valve's own oscillations (`second_order_relief_valve`, of which this is the
+    limit of much damping, T = 2 \zeta/\omega), nor for flow forces, which `opening_range` may contain.
     Source: balance of forces on a poppet with a linear spring; lag after Rundo & Corvaglia (2016), section 4, without
     mass: T is damping over stiffness.
     """
@@ -68,7 +68,7 @@ class ReliefValve(Lagging, Metering, Component):
 class SecondOrderReliefValve(Metering, Component):
     r"""Relief valve: static characteristic with the second-order motion of its poppet.
 
-    .. math:: q = C_d\, s A \sqrt{2|\Delta p|/\rho}\, \mathrm{sign}\,\Delta p, \quad
+    .. math:: q = C_d\, s A \sqrt{2\rho|\Delta p|}/\rho_0\, \mathrm{sign}\,\Delta p, \quad
               \frac{d^2 s}{dt^2} + 2 \zeta \omega \frac{ds}{dt} + \omega^2 s = \omega^2 \frac{\Delta p - p_c}{p_r},
               \quad 0 \le s \le 1
 
@@ -104,7 +104,7 @@ class SecondOrderReliefValve(Metering, Component):
 class ReducingValve(Lagging, Metering, Component):
     r"""Two-way pressure reducing valve: closes as its outlet reaches the set pressure.
 
-    .. math:: q = C_d\, s A \sqrt{2|\Delta p|/\rho}\, \mathrm{sign}\,\Delta p, \quad
+    .. math:: q = C_d\, s A \sqrt{2\rho|\Delta p|}/\rho_0\, \mathrm{sign}\,\Delta p, \quad
               T \frac{ds}{dt} = \frac{p_c - (p_b - p_d)}{p_r} - s, \quad 0 \le s \le 1
 
     \Delta p = p_a - p_b [Pa]; p_b [Pa] the reduced pressure, p_d [Pa] that of the drain behind the spring; p_c =
@@ -133,8 +133,8 @@ class ReducingValve(Lagging, Metering, Component):
 class ReducingRelievingValve(Lagging, Metering, Component):
     r"""Three-way pressure reducing valve: feeds its outlet below the set pressure, relieves it to the tank above.
 
-    .. math:: q_{in} = C_d \max(s, 0) A \sqrt{2|p_s - p_o|/\rho}, \quad
-              q_{out} = C_d \max(-s - u, 0) A \sqrt{2|p_o - p_t|/\rho}, \quad
+    .. math:: q_{in} = C_d \max(s, 0) A \sqrt{2\rho|p_s - p_o|}/\rho_0, \quad
+              q_{out} = C_d \max(-s - u, 0) A \sqrt{2\rho|p_o - p_t|}/\rho_0, \quad
               T \frac{ds}{dt} = \frac{p_c - (p_o - p_t)}{p_r} - s, \quad -1 - u \le s \le 1
 
     p_s, p_o, p_t [Pa] of supply, outlet and tank, flows of the sign of their drops; p_c = `set_pressure` up to which it
@@ -178,7 +178,7 @@ class ReducingRelievingValve(Lagging, Metering, Component):
 class SequenceValve(Lagging, Metering, Component):
     r"""Sequence valve: passes fluid on once its inlet, or a pilot line, has reached the set pressure.
 
-    .. math:: q = C_d\, s A \sqrt{2|\Delta p|/\rho}\, \mathrm{sign}\,\Delta p, \quad
+    .. math:: q = C_d\, s A \sqrt{2\rho|\Delta p|}/\rho_0\, \mathrm{sign}\,\Delta p, \quad
               T \frac{ds}{dt} = \frac{p_x - p_d - p_c}{p_r} - s, \quad 0 \le s \le 1
 
     \Delta p = p_a - p_b [Pa]; p_x [Pa] of the pilot, which is joined to the inlet's net (internal pilot) or to another
@@ -212,7 +212,7 @@ class SequenceValve(Lagging, Metering, Component):
 class CounterbalanceValve(Lagging, Metering, Component):
     r"""Counterbalance valve: holds a load until its own pressure and that of the pilot open it.
 
-    .. math:: q = C_d\, s A \sqrt{2|\Delta p|/\rho}\, \mathrm{sign}\,\Delta p, \quad
+    .. math:: q = C_d\, s A \sqrt{2\rho|\Delta p|}/\rho_0\, \mathrm{sign}\,\Delta p, \quad
               T \frac{ds}{dt} = \frac{p_a + R p_x - (1 + R) p_b - p_c}{p_r} - s, \quad 0 \le s \le 1
 
     \Delta p = p_a - p_b [Pa]; p_a [Pa] of the load, p_b of the outlet, whose pressure acts on the spring's side: a
@@ -246,7 +246,7 @@ class CounterbalanceValve(Lagging, Metering, Component):
 class PressureCompensator(Lagging, Metering, Component):
     r"""Pressure compensator: keeps the drop over a metering edge behind it constant, whatever the load.
 
-    .. math:: q = C_d\, s A \sqrt{2|\Delta p|/\rho}\, \mathrm{sign}\,\Delta p, \quad
+    .. math:: q = C_d\, s A \sqrt{2\rho|\Delta p|}/\rho_0\, \mathrm{sign}\,\Delta p, \quad
               T \frac{ds}{dt} = \frac{p_c + p_r - (p_b - p_l)}{p_r} - s, \quad 0 \le s \le 1
 
     \Delta p = p_a - p_b [Pa]; p_b - p_l [Pa] the drop over the metering edge between the outlet b and the load l; p_c =
@@ -276,7 +276,7 @@ class PressureCompensator(Lagging, Metering, Component):
 class BypassCompensator(Lagging, Metering, Component):
     r"""Bypass compensator: keeps the drop over a metering edge constant by sending the surplus to the tank.
 
-    .. math:: q = C_d\, s A \sqrt{2|\Delta p|/\rho}\, \mathrm{sign}\,\Delta p, \quad
+    .. math:: q = C_d\, s A \sqrt{2\rho|\Delta p|}/\rho_0\, \mathrm{sign}\,\Delta p, \quad
               T \frac{ds}{dt} = \frac{p_a - p_l - p_c}{p_r} - s, \quad 0 \le s \le 1
 
     \Delta p = p_a - p_b [Pa]; p_a - p_l [Pa] the drop over the metering edge between the inlet a, at the pump, and the

@@ -20,7 +20,7 @@ from .valve_laws import Metering, clipped
 class ProportionalReliefValve(Lagging, Metering, Component):
     r"""Proportional relief valve: a signal sets its cracking pressure, as the current of a solenoid does.
 
-    .. math:: q = C_d\, s A \sqrt{2|\Delta p|/\rho}\, \mathrm{sign}\,\Delta p, \quad
+    .. math:: q = C_d\, s A \sqrt{2\rho|\Delta p|}/\rho_0\, \mathrm{sign}\,\Delta p, \quad
               T \frac{ds}{dt} = \frac{\Delta p - \max(p_c, 0)}{p_r} - s, \quad 0 \le s \le 1
 
     \Delta p = p_a - p_b [Pa]; p_c = `setting` [Pa], below 0 counted as 0; p_r = `opening_range` [Pa]; s = `lift` [-]; A
@@ -49,7 +49,7 @@ class ProportionalReliefValve(Lagging, Metering, Component):
 class FlowDivider(Lagging, Metering, Component):
     r"""Flow divider of spool type: shares its inlet out to two outlets in a set ratio, whatever their pressures.
 
-    .. math:: q_k = C_d \frac{A_k n_k}{\sqrt{1 + n_k^2}} \sqrt{\frac{2 |p - p_k|}{\rho}}\, \mathrm{sign}(p - p_k), \quad
+    .. math:: q_k = C_d \frac{A_k n_k}{\sqrt{1 + n_k^2}} \sqrt{2 \rho |p - p_k|}/\rho_0\, \mathrm{sign}(p - p_k), \quad
               d_k = \frac{n_k^2}{1 + n_k^2} (p - p_k), \quad
               T \frac{dx}{dt} = \frac{d_a - d_b}{p_r} - x, \quad -1 \le x \le 1
 
@@ -106,7 +106,8 @@ class FlowDivider(Lagging, Metering, Component):
 class PriorityValve(Lagging, Metering, Component):
     r"""Priority valve: feeds its priority outlet first, what that does not need goes to the other one.
 
-    .. math:: q_{CF} = C_d (1 - s) A \sqrt{2|p - p_{CF}|/\rho}, \quad q_{EF} = C_d\, s A \sqrt{2|p - p_{EF}|/\rho},
+    .. math:: q_{CF} = C_d (1 - s) A \sqrt{2\rho|p - p_{CF}|}/\rho_0, \quad
+              q_{EF} = C_d\, s A \sqrt{2\rho|p - p_{EF}|}/\rho_0,
               \quad T \frac{ds}{dt} = \frac{p_{CF} - p_{LS} - p_c}{p_r} - s, \quad 0 \le s \le 1
 
     p [Pa] of the inlet, p_CF of the priority outlet, p_EF of the surplus, p_LS at the load, flows of the sign of their
