@@ -42,10 +42,10 @@ class ReliefValve(Lagging, Metering, Component):
               T \frac{ds}{dt} = \frac{\Delta p - p_c}{p_r} - s, \quad 0 \le s \le 1
 
     \Delta p = p_a - p_b [Pa]; p_c = `cracking_pressure`, p_r = `opening_range` [Pa]; s = `lift` [-]; A = `area` [m^2];
-    T = `time_constant` [s]; C_d [-] follows the flow number as in `orifice`; \rho [kg/m^3] at the mean pressure. At
-    rest it passes q at \Delta p = p_c + s p_r. The poppet rests on its seat, and on its stop at s = 1, until the
-    pressure leads it away. Not for the valve's own oscillations (`second_order_relief_valve`, of which this is the
-    limit of much damping, T = 2 \zeta/\omega), nor for flow forces, which `opening_range` may contain.
+    T = `time_constant` [s]; C_d [-] follows the flow number as in `orifice`; \rho [kg/m^3] at the mean pressure.
+    At rest it passes q at \Delta p = p_c + s p_r. The poppet rests on its seat, and on its stop at s = 1, until the
+    pressure leads it away. Not for the valve's own oscillations (`second_order_relief_valve`, whose limit of much
+    damping this is, T = 2 \zeta/\omega), nor for flow forces, which `opening_range` may contain.
     Source: balance of forces on a poppet with a linear spring; lag after Rundo & Corvaglia (2016), section 4, without
     mass: T is damping over stiffness.
     """

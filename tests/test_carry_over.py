@@ -100,6 +100,18 @@ def test_last_volume_opens_when_the_crescent_ends(volumes, extension, sealed):
     assert list(after["exists"]) == [1.0] * (volumes - 1) + [0.0]
 
 
+@pytest.mark.parametrize(("volumes", "extension"), [(1, 34), (2, 60), (4, 115)])
+def test_a_volume_opens_extension_less_one_pitch_after_it_closed(volumes, extension):
+    """The tip before it came to the crescent a pitch before it closed, and leaves after `extension`: the volume is
+    followed from its closing through the places of the chain, shift by shift."""
+    part = chain(volumes, extension * DEG)
+    age = extension * DEG - PITCH
+    for after, carried in ((age - 1e-6, True), (age + 1e-6, False)):
+        shifts, turned = divmod(after, PITCH)
+        exists = at(part, turned, p=np.full(volumes, BAR))["exists"]
+        assert (shifts < volumes and exists[int(shifts)] == 1.0) == carried
+
+
 @pytest.mark.parametrize(("degrees", "contacts"), [(34, 1.2278), (40, 1.4444), (46, 1.6611), (52, 1.8778)])
 def test_mean_number_of_tips_is_that_of_table_4(degrees, contacts):
     """Table 4: 1.22, 1.44, 1.65, 1.87 contacts (exactly extension/27.6923 deg), one tip more than volumes."""
@@ -226,7 +238,8 @@ def test_chain_and_gears_agree_on_when_volumes_exist(gear, name, degrees):
 @pytest.mark.parametrize(("volumes", "write"), [(0, 1), (2, 1)])
 def test_number_of_volumes_must_fit_the_crescent(volumes, write):
     """Eq. 1: N is the whole part of extension/pitch."""
-    with pytest.raises(ValidationError, match=f"write volumes: {write}"):
+    when = "opens extension less one pitch after it closed"
+    with pytest.raises(ValidationError, match=f"{when}; write volumes: {write}"):
         chain(volumes)
 
 

@@ -178,6 +178,18 @@ def test_flow_is_displaced_less_what_leaks():
         assert value(run, "mean(throttle.q)") == pytest.approx(expected, rel=1e-3)
 
 
+def test_six_or_seven_spaces_are_carried():
+    """220 deg over a pitch of 30 deg: seven for 10 deg of each pitch, while the housing seals eight tips, six for the
+    other 20 deg. 2e-3: a whole number of pitches, each edge found to 1e-9 of the run and in two rows of one time."""
+    run = cl.load("external_gear_pump").simulate("10 ms")
+    exists = run["driver.exists"]
+    number = exists.sum(axis=1)
+    assert set(number) == {6.0, 7.0}
+    assert np.all(exists[:, :6] == 1)
+    shown = np.trapezoid(number - 6, run.time) / np.ptp(run.time)
+    assert shown == pytest.approx(1 / 3, abs=2e-3)
+
+
 def test_spaces_come_up_to_pressure_step_by_step():
     """Means of the six spaces that always exist rise by nearly equal steps, each about an eighth of the whole; the
     drag that helps them and the oil they take up make the later ones larger. Closed, they keep the suction's pressure.

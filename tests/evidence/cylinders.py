@@ -7,6 +7,7 @@ import math
 from building import circuit
 from crescentlab.components.cylinders import Cushion, DoubleActingCylinder, SingleActingCylinder
 from crescentlab.components.fluids import SimpleOil
+from scipy.optimize import brentq
 
 from evidence import Number, evidence
 
@@ -130,7 +131,8 @@ def compressed(p: float) -> float:
     "double_acting_cylinder",
     "single_acting_cylinder",
     source="energy of compressed oil, beta (exp(p/beta) - 1) - p per volume; of a spring, F_0 x + k x^2/2; of a stop, "
-    "k d^2/2; power of friction B v^2, of Hunt and Crossley's damping k d 3/2 (1 - e)/v_i v^2",
+    "k d^2/2; power of friction B v^2, of Hunt and Crossley's damping k d a v^2, w = a v_i of "
+    "w - ln(1 + w) = -e w - ln(1 - e w)",
     tolerance=1e-9,
     because="rounding",
 )
@@ -152,13 +154,14 @@ def energies() -> list[Number]:
     held = (50e-6 + 0.1 * CAP) * compressed(100 * BAR) + (50e-6 + 0.3 * RING) * compressed(20 * BAR)
     volume = 20e-6 + math.pi / 4 * 0.04**2 * 0.3001
     bent = 500 * 0.3001 + 2000 * 0.3001**2 / 2 + 1e8 * 1e-4**2 / 2
+    a = brentq(lambda w: (1 + w) * math.exp(-1.5 * w) - 1 + w / 2, 1.0, 2.0, xtol=1e-14) / 0.1
     return [
         Number("energy of both chambers", held, both["stored_energy"], "J"),
         Number("lost to friction and leakage", 3.0 + leak, both["loss"], "W"),
         Number(
             "energy of plunger, spring and stop", volume * compressed(50 * BAR) + bent, plunger["stored_energy"], "J"
         ),
-        Number("lost in the stop and to friction", 300 * 0.05**2 + 1e4 * 7.5 * 0.05**2, plunger["loss"], "W"),
+        Number("lost in the stop and to friction", 300 * 0.05**2 + 1e4 * a * 0.05**2, plunger["loss"], "W"),
     ]
 
 
