@@ -1,4 +1,4 @@
-"""Units of the quantities: values by definition, gauge and absolute pressures, what is said of a wrong or missing one."""
+"""Units of the quantities: values by definition, gauge and absolute pressures, what is said of wrong ones."""
 
 from __future__ import annotations
 
