@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 
 from crescentlab.component import Component, field_quantity, is_structural
-from crescentlab.domain import Held, Observable, Port, State
+from crescentlab.domain import Held, Observable, Port, Scheduled, State
 from crescentlab.errors import ComponentError, ExpressionError, InputError, Place, UnitError, nearest
 from crescentlab.explain import validated
 from crescentlab.expressions import Value, evaluate, is_expression, number_of
@@ -214,7 +214,8 @@ class _Elaboration:
                 instance.size_of(declared.size)
         except ComponentError as error:
             raise InputError(f"{full}: {error}", node.place) from None
-        stateful = {s.name: s for form in cls.forms() for s in form.declared(State) + form.declared(Held)}
+        begins = [s for form in cls.forms() for s in form.declared(State) + form.declared(Held)]
+        stateful = {s.name: s for s in begins if not isinstance(s, Scheduled)}
         start: dict[str, np.ndarray] = {}
         given = node.value["start"].value if isinstance(node.value, dict) and "start" in node.value else {}
         assert isinstance(given, dict)  # as the netlist checked
