@@ -97,6 +97,14 @@ class Component(BaseModel):
         """The causal forms of a family; for a plain class, itself."""
         return [form for sub in cls.__subclasses__() for form in sub.forms()] if cls.family else [cls]
 
+    @property
+    def unbalanced(self) -> str:
+        """Why its volumes do not follow its flows, so that the ledgers of a run with it cannot close; empty if they do.
+
+        A class whose simplification breaks the balance overrides it.
+        """
+        return ""
+
     @classmethod
     def asks_for(cls) -> list[str]:
         """Names of the arguments of ``equations``."""

@@ -357,3 +357,10 @@ def quantity_with(dims: Dims) -> Quantity:
             return candidate
     unit = si_unit(dims)
     return Quantity(unit, unit, dims, {normalise(unit): 1.0})
+
+
+def quantity_of_si(si: str) -> Quantity:
+    """The quantity that a file's SI unit belongs to; one with a display unit before others."""
+    known = [q for q in QUANTITIES.values() if q.si == si]
+    shown = [q for q in known if q.name in DISPLAY]
+    return (shown or known or [ratio if si in ("", "1") else Quantity(si, si, (0, 0, 0, 0), {})])[0]

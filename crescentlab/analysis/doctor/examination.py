@@ -73,6 +73,11 @@ class Examination:
     """[J], largest first."""
     lines: tuple[LineError, ...]
 
+    def __repr__(self) -> str:
+        """Of which run."""
+        s, title = self.result.trajectory.statistics, self.result.title
+        return f"<Examination {title!r}: {self.span:g} s, {s.steps} steps, {len(self.lines)} lines>"
+
     @property
     def index(self) -> dict[str, float]:
         """Activity index, largest first."""

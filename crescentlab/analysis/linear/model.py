@@ -77,6 +77,17 @@ class LinearModel:
     direct: Array | None = field(default=None, repr=False)
     """Response of z to u at the tick itself, shape (z, inputs)."""
 
+    def __repr__(self) -> str:
+        """Its shape, and what it leads from and to."""
+        inputs, outputs = (
+            ", ".join(each.name for each in several[:8]) or "none" for several in (self.inputs, self.outputs)
+        )
+        kind = "" if self.period is None else f", sampled each {self.period:g} s"
+        return (
+            f"<LinearModel of {len(self.states)} states{kind}, residual {self.residual:.1e}; "
+            f"{len(self.inputs)} inputs: {inputs}; {len(self.outputs)} outputs: {outputs}>"
+        )
+
     @property
     def nyquist(self) -> float:
         """Angular frequency [rad/s] at which the ticks sample twice a period; infinite without ticks."""

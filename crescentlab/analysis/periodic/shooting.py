@@ -72,6 +72,12 @@ class Periodic:
     """Periods that a plain transient needs to come as near, if it was counted."""
     message: str = ""
 
+    def __repr__(self) -> str:
+        """How far it came, and the figures at the period's end."""
+        state = "converged" if self.converged else "not converged"
+        found = f"{state} in {self.periods} periods of {self.period:g} s, residual {self.residual:.1e}"
+        return f"<Periodic {self.result.title!r}: {found}; {self.result.summed_up()}>"
+
     @property
     def end(self) -> Snapshot:
         """Where the last period ended."""

@@ -62,6 +62,13 @@ class Sensitivities:
     reason: tuple[str, ...]
     result: Result
 
+    def __repr__(self) -> str:
+        """What was differentiated by what."""
+        outcomes = ", ".join(outcome.text for outcome in self.outcomes[:8])
+        parameters = ", ".join(parameter.name for parameter in self.parameters[:8])
+        shape = f"{len(self.outcomes)} outcomes by {len(self.parameters)} parameters"
+        return f"<Sensitivities of {shape}: {outcomes}; {parameters}>"
+
     @property
     def relative(self) -> Array:
         """Logarithmic sensitivities: percent of the outcome per percent of the parameter."""

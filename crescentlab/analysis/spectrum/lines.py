@@ -21,7 +21,7 @@ import numpy as np
 from crescentlab.analysis.spectrum.dense import SWING, Dense, Nodes, harmonics
 from crescentlab.errors import InputError
 from crescentlab.result import Result
-from crescentlab.units import DISPLAY, QUANTITIES, Quantity, ratio
+from crescentlab.units import QUANTITIES, Quantity, quantity_of_si
 
 Array = np.ndarray
 
@@ -66,6 +66,14 @@ class Spectrum:
     """rms of y(t) - y(t - T) over the last period, over that of the ripple; None if one is not known or rounding."""
     error: float
     """Bound of what integration may have left out of a line (SI)."""
+
+    def __repr__(self) -> str:
+        """Of what, and its strongest lines."""
+        si = self.quantity.si
+        lines = ", ".join(f"{line.amplitude:.4g} at {line.frequency:.6g} Hz" for line in self.strongest(4))
+        return (
+            f"<Spectrum {self.name!r}: mean {self.mean:.5g} {si}, ripple {self.rms:.4g} rms, lines {lines or 'none'}>"
+        )
 
     @property
     def amplitude(self) -> Array:
@@ -247,7 +255,7 @@ def spectra_of_rows(
         mean, rms = float(window.mean()), float(window.std())
         transform = 2 / m * np.fft.rfft(window - mean)[1 : lines + 1] * turning
         change, aliased = _change_of_rows(y, m // count, rms), _aliased(window, transform, turning)
-        quantity = quantity_of_unit(series.units.get(name, ""))
+        quantity = quantity_of_si(series.units.get(name, ""))
         window_facts = (name, quantity, begin, begin + count * period, period, count)
         found.append(Spectrum(*window_facts, frequencies, transform, mean, rms, change, aliased))
     return found
@@ -267,10 +275,3 @@ def _aliased(window: Array, lines: Array, turning: Array) -> float:
     coarse = 2 / half.size * np.fft.rfft(half - half.mean())[1:]
     some = min(lines.size, (half.size - 1) // 2)
     return float(np.abs(coarse[:some] * turning[:some] - lines[:some]).max()) if some else float("nan")
-
-
-def quantity_of_unit(si: str) -> Quantity:
-    """The quantity that a file's SI unit belongs to; one with a display unit before others."""
-    known = [q for q in QUANTITIES.values() if q.si == si]
-    shown = [q for q in known if q.name in DISPLAY]
-    return (shown or known or [ratio if si in ("", "1") else Quantity(si, si, (0, 0, 0, 0), {})])[0]

@@ -73,6 +73,11 @@ class OperatingPoint:
         one.trajectory.statistics.wall_s = self.wall_s
         object.__setattr__(self, "result", one)
 
+    def __repr__(self) -> str:
+        """How it was found, and its figures."""
+        found = f"by {self.method}, residual {self.residual:.1e}, {self.unknowns} unknowns"
+        return f"<OperatingPoint {self.result.title!r}: {found}; {self.result.summed_up()}>"
+
 
 def steady(
     circuit: Circuit, parameters: Mapping[str, str] | None = None, *, start: Start | None = None,
