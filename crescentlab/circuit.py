@@ -52,7 +52,7 @@ def shipped() -> dict[str, Path]:
 
 def find(name: str | Path) -> Path:
     """The file of a path or of a shipped circuit's name; raises :class:`InputError` offering the nearest."""
-    path = Path(name)
+    path = arguments.path(name, "circuit")
     if path.is_file():
         return path
     known = shipped()
@@ -74,6 +74,7 @@ class Circuit:
     """A circuit ready to be checked and simulated. Its files are read once: load it again to see them changed."""
 
     def __init__(self, netlist: Netlist, *, library: Library | None = None, no_code: bool = False) -> None:
+        arguments.instance(netlist, Netlist, "Circuit", "write crescentlab.load('relief_valve'), with your file's name")
         self.netlist = netlist
         self._library = library
         self.no_code = no_code
@@ -141,7 +142,7 @@ class Circuit:
         Raises :class:`InputError` if neither says it.
         """
         if given is not None:
-            return float(_time(given, "period", None))
+            return arguments.seconds(given, "period")
         text, place = self.netlist.sections.simulation.period, self.netlist.place("simulation", "period")
         if text is None:
             raise InputError(
@@ -150,7 +151,7 @@ class Circuit:
             )
         if not is_expression(text):
             try:
-                return float(_time(text, "period", None))
+                return arguments.seconds(text, "period")
             except InputError as error:
                 raise error.at(place) from None
         known = design.parameters[""]
@@ -162,7 +163,7 @@ class Circuit:
 
         try:
             seconds = number_of(evaluate(text, find), QUANTITIES["time"])
-            return float(_time(seconds, "period", None))
+            return arguments.seconds(seconds, "period")
         except InputError as error:
             raise InputError(f"period: {error.message.removeprefix('period: ')}", place) from None
 
@@ -183,7 +184,8 @@ class Circuit:
         system = self.assembled(design)
         section = self.netlist.sections.simulation
         options = Options(
-            stop=_time(stop, "stop", section.stop), rtol=section.rtol if rtol is None else rtol,
+            stop=_time(stop, "stop", section.stop),
+            rtol=section.rtol if rtol is None else arguments.number(rtol, "rtol", "1e-6"),
             solver=solver or section.solver, max_step=_time(max_step, "max_step", section.max_step),
             output_step=_time(output_step, "output_step", section.output_step),
             compile=section.compile if compile is None else compile,
@@ -204,6 +206,11 @@ class Circuit:
         if check and trajectory.status == "interrupted":
             raise KeyboardInterrupt(trajectory.error)
         return result
+
+
+def check_circuit(circuit: Any, name: str) -> None:
+    """Refuse what is no circuit; raises :class:`InputError`."""
+    arguments.instance(circuit, Circuit, name, "write crescentlab.load('relief_valve') first, with your file's name")
 
 
 def snapshot_of(start: Start, system: System) -> Snapshot:
@@ -244,9 +251,7 @@ def check_options(options: Options) -> None:
         raise InputError(
             f"rtol {options.rtol:g}: the relative tolerance lies between 0 and 1, from 1e-13 on; write for example 1e-6"
         )
-    if options.solver not in SOLVERS:
-        close = nearest(options.solver, SOLVERS, otherwise="none is called that")
-        raise InputError(f"solver {options.solver!r}: {close} ({', '.join(SOLVERS)})")
+    arguments.choice(options.solver, "solver", SOLVERS)
     if options.output_step is not None and options.stop / options.output_step > MAX_ROWS:
         raise InputError(f"output_step {options.output_step:g} s makes more than {MAX_ROWS} rows; write a longer one")
     if options.output_step is not None and options.output_step > options.span:

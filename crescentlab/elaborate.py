@@ -39,6 +39,8 @@ class Instance:
     component: Component
     place: Place | None
     start: dict[str, np.ndarray] = field(default_factory=dict)
+    forms: tuple[type[Component], ...] = ()
+    """Of a family, the causal forms that the library of its file has; of another class, itself."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -187,9 +189,7 @@ class _Elaboration:
                     netlist, section.type, node, full, values, library, overrides, chain
                 )
             else:
-                self.component(
-                    netlist, library.component(section.type, node.place_of("type")), node, full, values, overrides
-                )
+                self.component(netlist, library, section.type, node, full, values, overrides)
         for name, net in sections.nets.items():
             self.net(netlist, prefix, name, net, inner_ports)
         for name in sections.outputs:
@@ -203,12 +203,14 @@ class _Elaboration:
     def component(
         self,
         netlist: Netlist,
-        cls: type[Component],
+        library: Library,
+        kind: str,
         node: Node,
         full: str,
         values: dict[str, Value],
         overrides: _Overrides,
     ) -> None:
+        cls = library.component(kind, node.place_of("type"))
         lookup = _scope_lookup(values, netlist)
         instance = self.instance(cls, node, lookup, overrides, full, netlist.folder)
         try:
@@ -216,7 +218,8 @@ class _Elaboration:
                 instance.size_of(declared.size)
         except ComponentError as error:
             raise InputError(f"{full}: {error}", node.place) from None
-        stateful = {s.name: s for form in cls.forms() for s in form.declared(State) + form.declared(Held)}
+        forms = library.forms(cls)
+        stateful = {s.name: s for form in forms for s in form.declared(State) + form.declared(Held)}
         start: dict[str, np.ndarray] = {}
         given = node.value["start"].value if isinstance(node.value, dict) and "start" in node.value else {}
         assert isinstance(given, dict)  # as the netlist checked
@@ -235,7 +238,7 @@ class _Elaboration:
                 quantity = instance.quantity(declared.quantity)
                 items = source.value if isinstance(source.value, list) else [source]
                 start[name] = np.array([_number(str(i.value), quantity, lookup, subject, i.place) for i in items])
-        self.instances[full] = Instance(full, instance, node.place, start)
+        self.instances[full] = Instance(full, instance, node.place, start, tuple(forms))
 
     def instance(self, cls: type[Any], node: Node, lookup: Any, overrides: _Overrides, full: str, folder: Path) -> Any:
         """Validate a component or fluid; expressions become numbers first, ``--set`` texts replace.

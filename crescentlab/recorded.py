@@ -40,7 +40,7 @@ class Recorded(Result):
 
     def _refuse(self, what: str) -> NoReturn:
         raise InputError(
-            f"{self.path}: the file holds no {what}, only rows of {len(self._columns)} variables; simulate"
+            f"{self.path}: a file holds rows of variables, not the {what} of its run; simulate the circuit again"
         )
 
     def __getattr__(self, name: str) -> Any:

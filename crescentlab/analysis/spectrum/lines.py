@@ -18,8 +18,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from crescentlab import arguments
 from crescentlab.analysis.spectrum.dense import SWING, Dense, Nodes, harmonics
+from crescentlab.arguments import Number
 from crescentlab.errors import InputError
+from crescentlab.recorded import Recorded
 from crescentlab.result import Result
 from crescentlab.units import QUANTITIES, Quantity, quantity_of_si
 
@@ -99,14 +102,23 @@ class Spectrum:
 
 
 def spectra(
-    result: Result, names: Sequence[str], period: float, *, periods: int | None = None, start: float | None = None,
-    highest: float | None = None,
+    result: Result, names: str | Sequence[str], period: Number, *, periods: int | None = None,
+    start: Number | None = None, highest: Number | None = None,
 ) -> list[Spectrum]:  # fmt: skip
-    """Spectra of variables over whole periods [s] that end with the run.
+    """Spectra of variables over whole periods [s] that end with the run; of a result that was read, from its even rows.
 
     ``periods`` of them, or as many as fit after ``start`` [s], or the last one. Lines go up to ``highest`` [Hz], by
     default 50 harmonics. Raises :class:`InputError` if the run is too short, or for names that do not exist.
     """
+    arguments.instance(result, Result, "spectrum", "write circuit.simulate() or crescentlab.read(path) first")
+    names, period = arguments.names(names, "names"), arguments.seconds(period, "period")
+    periods = None if periods is None else arguments.whole(periods, "periods", 1, 1)
+    start = None if start is None else arguments.quantity(start, "start", time)
+    highest = None if highest is None else arguments.quantity(highest, "highest", frequency, above=0.0)
+    if isinstance(result, Recorded):
+        columns = [column for name in names for column in result.elements(name)]
+        series = Series(str(result.path), result.time, {n: result[n] for n in columns}, result.units)
+        return spectra_of_rows(series, columns, period, periods=periods, start=start, highest=highest)
     dense = Dense(result, names)
     stop, count = dense.stop, whole_periods(dense.start, dense.stop, period, periods, start)
     begin = _begin(dense, stop, count * period)
