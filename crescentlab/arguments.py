@@ -10,7 +10,7 @@ from typing import Any, TypeAlias
 
 import numpy as np
 
-from crescentlab.errors import InputError, UnitError, nearest
+from crescentlab.errors import ArgumentError, InputError, UnitError, nearest
 from crescentlab.units import QUANTITIES, Quantity
 
 Setting: TypeAlias = "str | float | bool | Iterable[float]"
@@ -25,13 +25,13 @@ def settings(given: Any) -> dict[str, Any]:
     if given is None:
         return {}
     if not isinstance(given, Mapping):
-        raise InputError(f"parameters: {_shown(given)} is no dictionary; write for example {{'supply': '30 L/min'}}")
+        raise ArgumentError(f"parameters: {_shown(given)} is no dictionary; write for example {{'supply': '30 L/min'}}")
     return {_name(name): _setting(name, value) for name, value in given.items()}
 
 
 def _name(name: Any) -> str:
     if not isinstance(name, str):
-        raise InputError(f"parameters: {_shown(name)} is no name; write for example 'valve.cracking_pressure'")
+        raise ArgumentError(f"parameters: {_shown(name)} is no name; write for example 'valve.cracking_pressure'")
     return name
 
 
@@ -44,7 +44,8 @@ def _setting(name: str, value: Any) -> Any:
     if isinstance(plain, bool):
         return plain
     if not isinstance(plain, Real):
-        raise InputError(f"parameters: {name}: {_shown(value)} is neither a number in SI nor text such as '30 L/min'")
+        said = f"{_shown(value)} is neither a number in SI nor text such as '30 L/min'"
+        raise ArgumentError(f"parameters: {name}: {said}")
     if not math.isfinite(plain):
         raise InputError(f"parameters: {name}: {float(plain)} is not a finite number")
     return int(plain) if isinstance(plain, Integral) else float(plain)
@@ -90,14 +91,14 @@ def _real(value: Any, name: str, advice: str) -> float:
     if isinstance(value, np.ndarray) and value.ndim == 0:
         value = value.item()
     if isinstance(value, (bool, np.bool_)) or not isinstance(value, Real):
-        raise InputError(f"{name}: {_shown(value)} is no number; {advice}")
+        raise ArgumentError(f"{name}: {_shown(value)} is no number; {advice}")
     return float(value)
 
 
 def path(value: Any, name: str) -> Path:
     """A file's path; raises :class:`InputError`."""
     if not isinstance(value, (str, Path)) or not str(value).strip():
-        raise InputError(f"{name}: {_shown(value)} is no path; write the file's name as text")
+        raise ArgumentError(f"{name}: {_shown(value)} is no path; write the file's name as text")
     return Path(value)
 
 
@@ -107,7 +108,7 @@ def names(value: Any, name: str, example: str = "line.p") -> list[str]:
     several = list(given) if isinstance(given, Iterable) and not isinstance(given, bytes) else [given]
     for each in several:
         if not isinstance(each, str):
-            raise InputError(f"{name}: {_shown(each)} is no name; write for example '{example}'")
+            raise ArgumentError(f"{name}: {_shown(each)} is no name; write for example '{example}'")
     return [str(each) for each in several]
 
 
@@ -123,7 +124,7 @@ def choice(value: Any, name: str, among: Iterable[str]) -> str:
 def instance(value: Any, kind: type, name: str, advice: str) -> None:
     """Refuse what is no ``kind``; raises :class:`InputError`."""
     if not isinstance(value, kind):
-        raise InputError(f"{name}: {_shown(value)} is no {kind.__name__}; {advice}")
+        raise ArgumentError(f"{name}: {_shown(value)} is no {kind.__name__}; {advice}")
 
 
 def _shown(value: Any) -> str:

@@ -17,7 +17,7 @@ from typing import Annotated, Any
 from pydantic import GetCoreSchemaHandler
 from pydantic_core import CoreSchema, PydanticCustomError, core_schema
 
-from crescentlab.errors import UnitError, nearest
+from crescentlab.errors import ComponentError, UnitError, nearest
 
 Dims = tuple[int, int, int, int]
 """Exponents of kg, m, s, K. Angles are pure numbers."""
@@ -308,7 +308,7 @@ def quantity_of(annotation: Any) -> Quantity:
     for extra in getattr(annotation, "__metadata__", ()):
         if isinstance(extra, Quantity):
             return extra
-    raise TypeError(f"{annotation!r} is not a quantity type; use one of crescentlab.units, for example Pressure")
+    raise ComponentError(f"{annotation!r} is not a quantity type; use one of crescentlab.units, for example Pressure")
 
 
 def quantity_named(name: str) -> Quantity:
