@@ -15,6 +15,7 @@ from crescentlab.component import Component
 from crescentlab.contract.case import USUAL_PRESSURE, Case, Values
 from crescentlab.domain import HYDRAULIC, SIGNAL, TRANSLATIONAL, Held, Observable, Port, State
 from crescentlab.energy import power_ports
+from crescentlab.errors import ArgumentError, ContractError
 from crescentlab.fluid import Fluid
 from crescentlab.trace import Layout
 
@@ -27,11 +28,11 @@ BY_DIFFERENCE = 1e-3
 
 def _require(kept: bool, message: str) -> None:
     if not kept:
-        raise AssertionError(message)
+        raise ContractError(message)
 
 
 def check_fluid(fluid: Fluid) -> None:
-    """The laws of a fluid belong together: beta = rho dp/drho, and dw/dp = 1/rho; raises :class:`AssertionError`.
+    """The laws of a fluid belong together: beta = rho dp/drho, and dw/dp = 1/rho; raises :class:`ContractError`.
 
     At gauge pressures from 0.9 bar of tension to 1000 bar, each within what a central difference can tell.
     """
@@ -115,7 +116,7 @@ def check_jacobian(case: Case) -> None:
             told = ", ".join(f"{name} = {np.squeeze(value)}" for name, value in values.items())
             where = "" if one is case else f" for {one.component!r}"
             said = f"{case.name}: d {rows[i]} / d {columns[j]} is {found[i, j]} at {told}{where}"
-            raise AssertionError(f"{said}; round it there, inside the branch if it is in one: both are differentiated")
+            raise ContractError(f"{said}; round it there, inside the branch if it is in one: both are differentiated")
 
 
 def _at_bounds(case: Case) -> Iterator[Case]:
@@ -217,7 +218,7 @@ def check_reaction(case: Case) -> None:
 def check_restriction(case: Case, backwards: Backwards = "equal") -> None:
     """A restriction keeps nothing: q_a + q_b = 0; with its pressures exchanged it passes what ``backwards`` says."""
     if backwards not in get_args(Backwards):
-        raise TypeError(f"backwards={backwards!r}: write one of {', '.join(map(repr, get_args(Backwards)))}")
+        raise ArgumentError(f"backwards={backwards!r}: write one of {', '.join(map(repr, get_args(Backwards)))}")
     a, b = (p for p in case.cls.ports() if p.domain is HYDRAULIC)
     for seed in range(3):
         values = case.point(seed)
