@@ -218,7 +218,8 @@ class _Elaboration:
                 instance.size_of(declared.size)
         except ComponentError as error:
             raise InputError(f"{full}: {error}", node.place) from None
-        begins = [s for form in library.forms(cls) for s in form.declared(State) + form.declared(Held)]
+        forms = library.forms(cls)
+        begins = [s for form in forms for s in form.declared(State) + form.declared(Held)]
         stateful = {s.name: s for s in begins if not isinstance(s, Scheduled)}
         start: dict[str, np.ndarray] = {}
         given = node.value["start"].value if isinstance(node.value, dict) and "start" in node.value else {}
