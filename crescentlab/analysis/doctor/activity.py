@@ -5,7 +5,7 @@ r"""Energy through the parts of a circuit: which of them the run is about, and w
 A_i [J] the activity of component i; e f the power into it at each port: p q (pressure above the atmosphere times flow
 at 0 bar gauge), f v, torque omega, and of a chamber p dV/dt. A part that hands on what it takes, like a gear set
 without losses, has little activity of its own. Neither has the mass of a load that is lifted: what counts there is
-what passes on from one neighbour to another at the nets where it gives the motion (a volume: the pressure),
+what passes on from one neighbour to another at the nets where it gives the motion,
 \tfrac12 \sum_{members} \int |e f| dt. Integrated on the Gauss nodes of the run's own polynomials.
 Source: L. S. Louca, J. L. Stein, G. M. Hulbert, J. K. Sprague, Proper model generation: an energy-based methodology,
 Proc. Int. Conf. Bond Graph Modeling (ICBGM), Phoenix (1997) 44-49.
@@ -39,7 +39,7 @@ def activities(result: Result) -> dict[str, float]:
 
 
 def passed_on(result: Result) -> dict[str, float]:
-    """Energy [J] that passes at the nets where a component gives the motion or the pressure, by component."""
+    """Energy [J] that passes at the nets where a component gives the motion, by component."""
     system = result.system
     givers, function = system.once("powers of nets", lambda: _passing(system))
     found: dict[str, float] = {}
@@ -86,12 +86,12 @@ def _powers(system: System) -> tuple[list[str], ca.Function]:
 
 
 def _passing(system: System) -> tuple[list[str], ca.Function]:
-    """For each member of each net with power the component that gives there; the function of the members' powers."""
+    """For each member of each net of motion the component that gives there; the function of the members' powers."""
     givers: list[str] = []
     powers: list[ca.SX] = []
     for net in system.plan.graph.nets:
         giver = system.plan.givers[net.name]
-        if giver is None or net.domain not in POWER:
+        if giver is None or net.domain not in (TRANSLATIONAL, ROTATIONAL):
             continue
         for member in net.members:
             if type(system.plan.components[member.instance]).port_named(member.port.name).role == "reads":
