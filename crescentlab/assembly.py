@@ -172,12 +172,13 @@ class _Assembly:
             held_quantities=held_quantities,
             counting_states=self.counting(State),
             counting_held=self.counting(Held),
-            bits=self.bits(g, b, timed.strict),
+            bits=self.bits(g, b, timed),
             _variables=self.variables,
             remapping=self.remap,
             reading=self.reading,
             _contents=self.contents(),
             _energies=self.energies,
+            outputs_by_part=self.outputs_by_part,
             _passing=lambda: {n: self.flows(n) for n, c in self.plan.components.items() if passes_fluid(type(c))},
         )
 
@@ -277,19 +278,20 @@ class _Assembly:
             relations[:], conditions[:] = rest[: len(relations)], rest[len(relations) :]
         return derivative, timed
 
-    def bits(self, g: ca.SX, b: ca.SX, on_time: list[bool]) -> Bits:
+    def bits(self, g: ca.SX, b: ca.SX, on_time: TimeAlone) -> Bits:
         n = g.numel()
         names = [f"{name}: {info.text}" for name, tr in self.plan.traces.items() for info in tr.relations]
         strict = [info.strict for tr in self.plan.traces.values() for info in tr.relations]
         extra = getattr(self, "stop_strict", [])
         names += ["stop_when"] * len(extra)
-        names += [TIME_ALONE] * len(on_time)
-        strict += extra + on_time
+        names += [TIME_ALONE] * len(on_time.bits)
+        strict += extra + on_time.strict
         switches = [info.switches for tr in self.plan.traces.values() for info in tr.relations]
-        switches += [False] * (len(extra) + len(on_time))
+        switches += [False] * (len(extra) + len(on_time.bits))
         on_state = _depends(g, self.x) if n else np.zeros(0, bool)
         timed = (_depends(g, self.t) if n else np.zeros(0, bool)) & ~on_state
         curved = np.array(ca.which_depends(g, self.t, 2, True), bool) if n and timed.any() else np.zeros(n, bool)
+        curved[n - len(on_time.bits) :] = ~np.array(on_time.straight, bool)
         held = _depends(g, ca.vertcat(self.h, b)) if n else np.zeros(0, bool)
         return Bits(
             tuple(names), np.array(strict, bool), on_state, timed, timed & ~curved, held, np.array(switches, bool)
@@ -487,6 +489,12 @@ class _Assembly:
                         functools.partial(self.flows, name),
                     )
         return found
+
+    def outputs_by_part(self) -> list[tuple[str, ca.SX]]:
+        """What each step of the plan's order gives, by component."""
+        steps = [step for wave in self.plan.order for step in wave]
+        groups = [(step.instance, self.plan.traces[step.instance].groups[step.group]) for step in steps]
+        return [(name, self.outputs.nz[self.output_of.places([name], group.outputs)]) for name, group in groups]
 
     def energies(self) -> dict[str, ca.SX]:
         """Per component through which power passes, its five rows of the ledger."""

@@ -122,6 +122,8 @@ class System:
     _contents: dict[str, tuple[Callable[[], ca.SX], Callable[[], tuple[ca.SX, ca.SX]]]]
     _energies: Callable[[], dict[str, ca.SX]]
     _passing: Callable[[], dict[str, tuple[ca.SX, ca.SX]]]
+    outputs_by_part: Callable[[], list[tuple[str, ca.SX]]]
+    """What each component gives at its ports, in the order in which it is evaluated."""
     _once: dict[Any, Any] = field(default_factory=dict)
     built: dict[tuple[str, str], Prepared] = field(default_factory=dict)
     """Functions that have been compiled, by name and form (see :mod:`crescentlab.solvers.promotion`)."""

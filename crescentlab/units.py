@@ -17,7 +17,7 @@ from typing import Annotated, Any
 from pydantic import GetCoreSchemaHandler
 from pydantic_core import CoreSchema, PydanticCustomError, core_schema
 
-from crescentlab.errors import UnitError, nearest
+from crescentlab.errors import ComponentError, UnitError, nearest
 
 Dims = tuple[int, int, int, int]
 """Exponents of kg, m, s, K. Angles are pure numbers."""
@@ -364,7 +364,7 @@ def quantity_of(annotation: Any) -> Quantity:
     for extra in getattr(annotation, "__metadata__", ()):
         if isinstance(extra, Quantity):
             return extra
-    raise TypeError(f"{annotation!r} is not a quantity type; use one of crescentlab.units, for example Pressure")
+    raise ComponentError(f"{annotation!r} is not a quantity type; use one of crescentlab.units, for example Pressure")
 
 
 def quantity_named(name: str) -> Quantity:
@@ -421,3 +421,10 @@ def quantity_with(dims: Dims) -> Quantity:
             return candidate
     unit = si_unit(dims)
     return Quantity(unit, unit, dims, {normalise(unit): 1.0})
+
+
+def quantity_of_si(si: str) -> Quantity:
+    """The quantity that a file's SI unit belongs to; one with a display unit before others."""
+    known = [q for q in QUANTITIES.values() if q.si == si]
+    shown = [q for q in known if q.name in DISPLAY]
+    return (shown or known or [ratio if si in ("", "1") else Quantity(si, si, (0, 0, 0, 0), {})])[0]

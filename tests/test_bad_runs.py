@@ -113,6 +113,18 @@ def test_failing_runs(refused: Refusal, law: str, said: str, end: float) -> None
         assert float(saved.time[-1]) == pytest.approx(end, rel=0.02)
 
 
+@pytest.mark.parametrize("solver", ["auto", "lsoda", "bdf", "radau", "rk45", "dop853", "rodas", "dopri"])
+def test_advice_never_names_the_solver_in_use(solver: str, refused: Refusal) -> None:
+    """x' = -1/x ends where x = sqrt(1 - 2 t) meets zero, whatever integrates."""
+    refused.write({"c.yaml": PART, "mine.py": f'{HEAD}"der_x": -1 / x}}\n'})
+    for rtol in ("1e-6", "1e-9"):
+        code, _, err = refused.run("simulate", "c.yaml", "--quiet", "-o", "none", "--solver", solver, "--rtol", rtol)
+        named = re.search(r"a\.x limits it; try --solver (\w+),", err)
+        assert code == 3
+        assert named, err
+        assert named[1] in {"rodas", "radau", "lsoda"} - {solver}
+
+
 SUCKED = f"""\
 crescentlab: 1
 {OIL}
