@@ -29,6 +29,7 @@ from crescentlab.plotting import check_plots
 from crescentlab.recorded import Recorded, read
 from crescentlab.result import Result
 from crescentlab.solvers.options import Options
+from crescentlab.solvers.ranges import beyond_ranges
 from crescentlab.solvers.snapshot import Snapshot
 from crescentlab.system import System
 from crescentlab.trace import structure_of
@@ -198,6 +199,7 @@ class Circuit:
         from crescentlab.solvers.integrate import integrate  # a third of a second of SciPy that `check` does without
 
         trajectory = integrate(system, values, options, progress, begin)
+        trajectory.warnings += beyond_ranges(system, values.p, trajectory.steps)
         result = Result(system, values if begin is None else begin.values(values), design, trajectory)
         if check and trajectory.status == "failed":
             failure = SimulationError(trajectory.error)
