@@ -37,6 +37,8 @@ class Instance:
     component: Component
     place: Place | None
     start: dict[str, np.ndarray] = field(default_factory=dict)
+    places: dict[str, Place | None] = field(default_factory=dict)
+    """Where each of its parameters was written."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -231,7 +233,10 @@ class _Elaboration:
                 items = source.value if isinstance(source.value, list) else [source]
                 subject = f"{'--set ' if text is not None else ''}{full}.start.{name}"
                 start[name] = np.array([_number(str(i.value), quantity, lookup, subject, i.place) for i in items])
-        self.instances[full] = Instance(full, instance, node.place, start)
+        assert isinstance(node.value, dict)
+        places = {name: child.place for name, child in node.value.items()}
+        places |= {name: COMMAND for name in cls.model_fields if f"{full}.{name}" in overrides.used}
+        self.instances[full] = Instance(full, instance, node.place, start, places)
 
     def instance(self, cls: type[Any], node: Node, lookup: Any, overrides: _Overrides, full: str, folder: Path) -> Any:
         """Validate a component or fluid; expressions become numbers first, ``--set`` texts replace.
