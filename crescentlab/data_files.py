@@ -24,7 +24,7 @@ from pathlib import Path
 import numpy as np
 
 from crescentlab.errors import InputError, Place, nearest
-from crescentlab.units import QUANTITIES, Quantity, normalise, parse_any
+from crescentlab.units import COMMON, QUANTITIES, Quantity, nearest_unit, normalise, parse_any
 
 COMMENT = "#"
 BLOCK = 4_000_000
@@ -243,8 +243,8 @@ def _title(title: str, top: Place) -> Title:
     if not name or (bracket and (not closed or after.strip())):
         raise InputError(f"the title {title!r} is not `name [unit]`, for example speed [rpm]", top)
     if unit and not any(normalise(unit) in q.units for q in QUANTITIES.values()):
-        known = [u for q in QUANTITIES.values() for u in q.units if u]
-        raise InputError(f"column {name!r}: unknown unit {unit!r}: {nearest(normalise(unit), known)}", top)
+        near = nearest_unit(normalise(unit), {u: 0 for q in QUANTITIES.values() for u in q.units})
+        raise InputError(f"column {name!r}: unknown unit {unit!r}: {near or f'units are {COMMON} and the like'}", top)
     return Title(name, unit)
 
 

@@ -3,8 +3,7 @@
 An integrator that steps over a pulse never sees it. So a comparison whose sides depend on time and parameters alone, or
 on held values and a straight line in time, becomes a relation wherever it is written, ``where(t > 1 s, ...)`` in a
 formula behind three signals included: its instant is known ahead, and no step passes it. What jumps (a comparison,
-``sign``, ``floor``) reads its frozen bit; what only bends (``min``, ``max``, ``abs``) stays as it is and makes a stop
-at its kink.
+``sign``, ``floor``) reads its frozen bit; what only bends (``min``, ``max``, ``abs``) makes a stop at its kink.
 """
 
 from __future__ import annotations
@@ -109,8 +108,12 @@ class _Conditions(Walk):
             low, high = (self.now(i) for i in parts)
             self.changed[k] = self.bit(high - low, COMPARISONS[op], (op, *parts))
         elif op in KINKS:
-            values = [self.now(i) for i in parts]
-            self.bit(values[-1] - values[0] if len(values) == 2 else values[0], True, (op, *parts))
+            first, second = (values := [self.now(i) for i in parts])[0], -values[0] if len(values) == 1 else values[1]
+            more = self.bit(first - second if len(values) == 2 else first, True, (op, *parts))
+            if self.straight:  # of a curve a root may be missed; the operation itself is right on either side
+                self.changed[k] = (
+                    ca.if_else(more, second, first) if op == ca.OP_FMIN else ca.if_else(more, first, second)
+                )
         elif op == ca.OP_SIGN:
             value = self.now(parts[0])
             self.changed[k] = self.bit(value, True, (op, parts[0], 1)) - self.bit(-value, True, (op, parts[0], -1))

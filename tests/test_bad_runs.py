@@ -30,7 +30,7 @@ SETTINGS = {
         ["supply=1 bar"],
         "--set supply: '1 bar': 'bar' is a unit of pressure, not of flow; write one of L/min",
     ),
-    "no unit": (["supply=1"], "--set supply: '1': a flow needs a unit; write for example 1 L/min"),
+    "no unit": (["supply=1"], "--set supply: '1': a flow needs a unit: 1 m3/s, 1000 L/s or 60000 L/min?"),
     "unknown unit": (["supply=1 mm/foo"], "unknown unit 'mm/foo' for a flow"),
     "a word": (["supply=much"], "--set supply: 'much' is not a number with a unit; write for example 1 L/min"),
     "another unit of a component": (["hole.area=1 bar"], "--set hole.area: '1 bar': 'bar' is a unit of pressure"),

@@ -18,9 +18,9 @@ import pytest
 ROOT = Path(__file__).resolve().parents[1]
 
 LAYERS: tuple[tuple[str, ...], ...] = (
-    ("errors", "files", "symbols", "units", "maths", "compiler", "c_text", "prepared", "columns", "schedule"),
-    ("walk", "time_alone", "data_files", "tables", "fluid", "domain", "component", "energy"),
-    ("expressions", "yaml_text", "explain", "library", "netlist"),
+    ("errors", "files", "series_files", "symbols", "units", "maths", "compiler", "c_text", "prepared", "columns"),
+    ("schedule", "walk", "time_alone", "data_files", "tables", "fluid", "domain", "component", "energy"),
+    ("arguments", "expressions", "yaml_text", "explain", "library", "netlist"),
     ("elaborate",),
     ("graph", "trace", "contract"),
     ("causality",),
@@ -29,7 +29,7 @@ LAYERS: tuple[tuple[str, ...], ...] = (
     ("assembly", "closed_sets"),
     ("solvers",),
     ("balance",),
-    ("result", "placement", "plotting", "schematic"),
+    ("result", "recorded", "placement", "plotting", "schematic"),
     ("circuit",),
     ("analysis",),
     ("studies", "report"),

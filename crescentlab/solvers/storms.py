@@ -23,7 +23,7 @@ class Storms:
     def __init__(self, system: System) -> None:
         self.names = [event.name for event in system.events] + list(system.bits.names)
         self.places = {name: k for k, name in enumerate(self.names[: len(system.events)])}
-        self.counted = np.concatenate((_on_states(system), system.bits.on_state))
+        self.counted = np.concatenate((_on_states(system), system.bits.on_state & system.bits.switches))
         """Shape (events + relations,)."""
         self.last = np.full(len(self.names), -(2**62))
         """Accepted steps at the last turn."""

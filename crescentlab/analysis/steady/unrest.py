@@ -9,7 +9,7 @@ import numpy as np
 from crescentlab.analysis.steady.closed import Ledger
 from crescentlab.analysis.steady.rest import Point, Site
 from crescentlab.closed_sets import NAMED, some
-from crescentlab.errors import InputError
+from crescentlab.errors import InputError, MovingError
 from crescentlab.units import QUANTITIES, Quantity
 
 Array = np.ndarray
@@ -20,14 +20,6 @@ ROUNDING = 1e-9
 """Share of the largest term below which a sum counts as rounding."""
 PROBES = (0.0, 0.0123, 0.317)
 """Times [s] after the present one at which dependence on the time is looked for, so that no extremum hides it."""
-
-
-class MovingError(InputError):
-    """The time itself keeps a circuit from coming to rest: ``why``, and what to do then."""
-
-    def __init__(self, why: str, advice: str) -> None:
-        super().__init__(f"{why}; {advice}")
-        self.why = why
 
 
 def check_drift(site: Site, point: Point, *, frozen: bool) -> str | None:
