@@ -41,6 +41,8 @@ class Instance:
     start: dict[str, np.ndarray] = field(default_factory=dict)
     forms: tuple[type[Component], ...] = ()
     """Of a family, the causal forms that the library of its file has; of another class, itself."""
+    places: dict[str, Place | None] = field(default_factory=dict)
+    """Where each of its parameters was written."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -241,7 +243,10 @@ class _Elaboration:
                 quantity = instance.quantity(declared.quantity)
                 items = source.value if isinstance(source.value, list) else [source]
                 start[name] = np.array([_number(str(i.value), quantity, lookup, subject, i.place) for i in items])
-        self.instances[full] = Instance(full, instance, node.place, start, tuple(forms))
+        assert isinstance(node.value, dict)
+        places = {name: child.place for name, child in node.value.items()}
+        places |= {name: COMMAND for name in cls.model_fields if f"{full}.{name}" in overrides.used}
+        self.instances[full] = Instance(full, instance, node.place, start, tuple(forms), places)
 
     def instance(self, cls: type[Any], node: Node, lookup: Any, overrides: _Overrides, full: str, folder: Path) -> Any:
         """Validate a component or fluid; expressions become numbers first, ``--set`` texts replace.

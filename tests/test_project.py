@@ -24,6 +24,7 @@ LAYERS: tuple[tuple[str, ...], ...] = (
     ("elaborate",),
     ("graph", "trace", "contract"),
     ("causality",),
+    ("pressures",),
     ("system",),
     ("assembly", "closed_sets"),
     ("solvers",),

@@ -95,13 +95,12 @@ class _CompiledRun:
         self.warnings += [notice] if (notice := self.promotion.before()) else []
         self.hybrid = Hybrid(system, values, options.start, options.stop)
         self.atol = options.rtol * system.nominal
-        self.diagnosis = Diagnosis(Functions(system, values), options.rtol, self.atol, options.solver)
-        self.limits = PressureLimits(system)
+        self.limits = PressureLimits(system, values.p)
+        self.diagnosis = Diagnosis(Functions(system, values), self.limits, options.rtol, self.atol, options.solver)
         self.storms = Storms(system)
         self.chatter = Chatter(system, values.p)
         self.chatter_at = FIRST_BLOCK
         self.chattering: str | None = None
-        self.tension: str | None = None
         self.run_ = native.Run()
         self.set_sizes()
         self.set_functions()
@@ -214,7 +213,7 @@ class _CompiledRun:
         if pace is not None:
             r.n_pace = pace[0].size
             r.give(pace_t=_real(pace[0]), pace_s=_real(pace[1]))
-        floor, held_floor = self.limits.ending  # what lies below is warned of
+        floor, held_floor = self.limits.states.ending, self.limits.held.ending
         r.give(atol=_real(self.atol), floor=_real(floor), held_floor=_real(held_floor))
 
     def set_scratch(self) -> None:
@@ -322,22 +321,13 @@ class _CompiledRun:
         return self.run_.kept["x"][: self.run_.n].copy()
 
     def drain(self) -> None:
-        """Take what was recorded, and look whether fluids that may were under tension, or a choice chatters."""
+        """Take what was recorded, and look whether a choice chatters."""
         block = self.records.drain()
         if block is None:
             return
         if self.run_.steps >= self.chatter_at:
             self.chatter_at *= 2
             self.chattering = self.chattering or self.chatter.look(*self.records.last(ROWS))
-        if self.tension:
-            return
-        held = block["world_h"][block["row_world"]]
-        for rows, kind in ((block["row_x"], self.limits.states), (held, self.limits.held)):
-            below = np.flatnonzero((rows < kind[1]).any(axis=1)) if any(kind[3]) else np.zeros(0, int)
-            if below.size and not self.tension:
-                k = int(below[0])
-                self.tension = self.limits.look(float(block["row_t"][k]), rows[k], *kind)
-                self.warnings += [self.tension] if self.tension else []
 
     # -- failures --------------------------------------------------------------------------------
 

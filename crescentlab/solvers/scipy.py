@@ -127,7 +127,10 @@ class Stepper:
         solver.status = "running"
         before = solver.t
         self.set_bound(bound)
-        message = solver.step()
+        try:
+            message = solver.step()
+        except (ValueError, RuntimeError) as error:  # a matrix that is not finite, or singular
+            raise SimulationError(str(error)) from None
         if solver.status == "failed":
             raise SimulationError(str(message))
         # a step cut short by the bound says nothing about the step the error would allow
