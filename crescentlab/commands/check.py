@@ -56,6 +56,7 @@ def facts(plan: Plan) -> dict[str, Any]:
         "states": _names(plan, "states"), "held": _names(plan, "held"),
         "relations": sum(len(tr.relations) for tr in plan.traces.values()),
         "events": events,
+        "warnings": list(plan.design.warnings),
         "forms": {name: type(c).type_name() for name, c in plan.components.items() if name in flexible},
     }  # fmt: skip
 
@@ -115,7 +116,8 @@ def told(plan: Plan, found: dict[str, Any]) -> str:
     ]
     lines += [f"  form        {name} is {form}: {_ends(plan, name)}" for name, form in found["forms"].items()]
     rows = list(_rows(plan, found["nets"]))
-    return "\n".join([*lines, "", table([("net", "domain", "given by", "taken by"), *rows], indent="  ", fold=True)])
+    parts = ["\n".join(lines), table([("net", "domain", "given by", "taken by"), *rows], indent="  ", fold=True)]
+    return "\n\n".join([*parts, *(f"  warning: {said}" for said in found["warnings"])])
 
 
 def _components(types: dict[str, str]) -> str:
