@@ -18,7 +18,7 @@ from pydantic import BaseModel, Field
 from crescentlab.component import Component, Equations
 from crescentlab.domain import dissipates, observable, takes_pressure, takes_rotation, takes_signal
 from crescentlab.fluid import Fluid
-from crescentlab.maths import Expr, fabs, tanh
+from crescentlab.maths import Expr, fabs, maximum, minimum, tanh
 from crescentlab.units import Displacement, Flow, Power, Ratio, Speed, Torque
 
 from .flow_laws import referred_flow

@@ -80,6 +80,12 @@ class SimulationSection(_Section):
     )
     output_step: Time | None = Field(default=None, gt=0, description="uniform output grid; default the accepted steps")
     compile: bool | None = Field(default=None, description="compile the equations; default where it pays")
+    start: Literal["steady"] | None = Field(
+        default=None, description="steady: the run begins at the operating point; default: at the start values"
+    )
+    start_pressure: str | None = Field(
+        default=None, description="start pressure of every part that states none of its own; an expression too"
+    )
     stop_when: str | None = Field(default=None, description="a condition that ends the run: line.p > 9 bar")
     period: str | None = Field(
         default=None, description="time after which the circuit repeats itself, an expression too: '= 2 * pi / speed'"
