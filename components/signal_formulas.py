@@ -1,5 +1,6 @@
 """Signals computed by a formula that the circuit writes."""
 
+from collections.abc import Callable
 from typing import Any, Self
 
 from pydantic import Field, model_validator
@@ -9,7 +10,7 @@ from crescentlab.component import Component, Equations
 from crescentlab.domain import gives_signal, takes_signal
 from crescentlab.errors import ExpressionError, nearest
 from crescentlab.expressions import Value, evaluate
-from crescentlab.maths import Expr
+from crescentlab.maths import Expr, event_where, where
 
 from .signal_quantities import QuantityName
 
@@ -30,8 +31,9 @@ class Expression(Component):
     u_k in the SI units of the quantities that `inputs` names, in this order; t [s]; y in that of `output_quantity` [1
     by default]. The `formula` is written as in `outputs`: numbers with units, + - * / **, sin, cos, tan, asin, acos,
     atan, atan2, sinh, cosh, tanh, exp, log, sqrt, abs, min, max, where, as in `formula: 'u1 * u2 / (1 kW)'`.
-    Parameters of the circuit reach it as inputs, from a `constant`. No event marks where `min`, `max`, `abs`, `where`
-    change over, so their branches should meet. Not for jumps: use `step`, `pulse`. Source: definition.
+    Parameters of the circuit reach it as inputs, from a `constant`. A `where` changes over at an event, so its branches
+    need not meet; conditions on time alone are exact stops. Not for a `where` whose branches drive its condition back
+    and forth, which has no solution: use a `relay`. Source: definition.
     """
 
     formula: str = Field(min_length=1, description="formula of u1, u2, ... and t, with units")
@@ -61,7 +63,7 @@ class Expression(Component):
     def _formula_gives_the_quantity(self) -> Self:
         symbol = Expr.of(1.0)  # a number could lie where the formula is not defined
         try:
-            result = self._evaluated(dict.fromkeys((*LETTERS, "t"), symbol))
+            result = self._evaluated(dict.fromkeys((*LETTERS, "t"), symbol), where)
         except ExpressionError as error:
             raise ValueError(error.message) from None
         wanted = units.quantity_named(self.output_quantity)
@@ -74,7 +76,7 @@ class Expression(Component):
             )
         return self
 
-    def _evaluated(self, values: dict[str, Any]) -> Value:
+    def _evaluated(self, values: dict[str, Any], choose: Callable[[Any, Any, Any], Any]) -> Value:
         known = {
             name: Value(values[name], units.quantity_named(quantity))
             for name, quantity in zip(LETTERS, self.inputs, strict=False)
@@ -86,7 +88,8 @@ class Expression(Component):
                 raise ExpressionError(f"{name!r} is no input: {nearest(name, known)}")
             return known[name]
 
-        return evaluate(self.formula, lookup)
+        return evaluate(self.formula, lookup, where=choose)
 
     def equations(self, u1: Expr, u2: Expr, u3: Expr, u4: Expr, u5: Expr, u6: Expr, t: Expr) -> Equations:
-        return {"y": self._evaluated({**dict(zip(LETTERS, (u1, u2, u3, u4, u5, u6), strict=True)), "t": t}).value}
+        values = {**dict(zip(LETTERS, (u1, u2, u3, u4, u5, u6), strict=True)), "t": t}
+        return {"y": self._evaluated(values, event_where).value}

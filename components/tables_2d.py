@@ -1,21 +1,22 @@
 """Tables of two variables, for characteristics such as an efficiency over speed and pressure."""
 
-import csv
+import math
 from itertools import pairwise
 from pathlib import Path
 from typing import Annotated, Any
 
+import numpy as np
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, ValidationInfo
 from pydantic_core import PydanticCustomError
 
 from crescentlab.component import Component, Equations
+from crescentlab.data_files import open_data, whole
 from crescentlab.domain import gives_signal, takes_signal
-from crescentlab.errors import InputError, Place, UnitError
+from crescentlab.errors import InputError
 from crescentlab.maths import Expr
 from crescentlab.units import Quantity, parse_any, ratio
 
-from .interpolation import surface
-from .signal_tables import Interpolation
+from .interpolation import Interpolation, surface
 
 MAX_POINTS = 2500
 """A table lives in the expressions of its circuit, so its size is bounded."""
@@ -108,22 +109,18 @@ def read_csv(path: Path) -> Surface:
 
     Raises :class:`InputError` with the line.
     """
-    try:
-        reader = csv.reader(path.read_text(encoding="utf-8-sig").splitlines())
-        rows = [(Place(str(path), reader.line_num), row) for row in reader if any(cell.strip() for cell in row)]
-    except OSError as error:
-        said = f"cannot read the table {path.name}: {error.strerror}; it is looked for beside the circuit file"
-        raise InputError(said) from None
-    except (UnicodeDecodeError, csv.Error) as error:
-        raise InputError(f"the table {path.name} is not text in UTF-8 ({error})") from None
-    top = Place(str(path), 1)
-    if not rows or len(rows[0][1]) != 3:
-        said = "the first line must name three columns with units, separated by commas"
-        raise InputError(f"{said}, for example: speed [rpm], pressure [bar], efficiency [%]", top)
-    columns = [_header(title, top) for title in rows[0][1]]
+    file = open_data(path, str(path))
+    if len(file.titles) != 3:
+        said = "the first line must name three columns with units"
+        raise InputError(f"{said}, for example: speed [rpm], pressure [bar], efficiency [%]", file.top)
+    table = whole(file)
+    names, quantities = list(table.columns), [table.file.quantity(k) for k in range(3)]
+    columns = [table.numbers(name, quantity) for name, quantity in zip(names, quantities, strict=True)]
     points: dict[tuple[float, float], float] = {}
-    for place, row in rows[1:]:
-        x, y, z = _row(row, columns, place)
+    for place, (x, y, z) in zip(table.places, np.transpose(columns).tolist(), strict=True):
+        for k, value in enumerate((x, y, z)):
+            if math.isnan(value):
+                raise file.empty(k, place)
         if (x, y) in points:
             raise InputError("this pair of x and y stands in an earlier line already; leave one of them out", place)
         points[x, y] = z
@@ -131,38 +128,15 @@ def read_csv(path: Path) -> Surface:
     missing = next(((x, y) for x in xs for y in ys if (x, y) not in points), None)
     if missing is not None:
         first, second = (
-            quantity.show(value, unit) for value, (quantity, unit) in zip(missing, columns[:2], strict=True)
+            quantity.show(value, title.unit)
+            for value, quantity, title in zip(missing, quantities, table.file.titles, strict=False)
         )
-        raise InputError(f"no line for {first} and {second}; the table needs every pair of its x and y", top)
+        raise InputError(f"no line for {first} and {second}; the table needs every pair of its x and y", table.top)
     grid = tuple(tuple(points[x, y] for y in ys) for x in xs)
     try:
-        return _checked(xs, ys, grid, (columns[0][0], columns[1][0], columns[2][0]))
+        return _checked(xs, ys, grid, (quantities[0], quantities[1], quantities[2]))
     except InputError as error:
-        raise error.at(top) from None
-
-
-def _row(row: list[str], columns: list[tuple[Quantity, str]], place: Place) -> list[float]:
-    if len(row) != 3 or not all(cell.strip() for cell in row):
-        said = "write three numbers separated by commas, their decimals after a point"
-        raise InputError(f"{said}, not {','.join(row)!r}", place)
-    values = []
-    for cell, (quantity, unit) in zip(row, columns, strict=True):
-        try:
-            values.append(quantity.parse(f"{float(cell)!r} {unit}"))
-        except (ValueError, UnitError):
-            raise InputError(f"{cell.strip()!r} is not a finite number", place) from None
-    return values
-
-
-def _header(title: str, top: Place) -> tuple[Quantity, str]:
-    name, _, rest = title.partition("[")
-    unit = rest.partition("]")[0].strip()
-    try:
-        return parse_any(f"1 {unit}".strip())[1], unit
-    except UnitError:
-        name = name.strip()
-        said = f"column {name!r}: unknown unit {unit!r}; write it in brackets, for example {name} [bar]"
-        raise InputError(said, top) from None
+        raise error.at(table.top) from None
 
 
 class Table2d(Component):

@@ -165,7 +165,7 @@ class PistonChambers(Component):
 class ValvePlate(Component):
     r"""Valve plate of an axial piston machine: kidney ports that each chamber meets once per turn.
 
-    .. math:: q_i = C_d A_i \sqrt{2 |\Delta p|/\rho}\; \mathrm{sign}\,\Delta p, \quad
+    .. math:: q_i = C_d A_i \sqrt{2\rho|\Delta p|}/\rho_0\; \mathrm{sign}\,\Delta p, \quad
               A_i = \max\!\left(R w \min(h - |\delta_i|, \kappa, 2h - \kappa),\;
               A_n \min\left(1, \frac{\delta_i + h + \nu}{\nu}\right)\right)
 

@@ -7,6 +7,7 @@ in a loop of its own, some thirty times faster than as many calls from Python.
 from __future__ import annotations
 
 import functools
+import itertools
 from collections.abc import Callable, Iterator, Sequence
 from typing import Any
 
@@ -23,6 +24,8 @@ from crescentlab.expressions import Value, evaluate
 from crescentlab.prepared import shared
 from crescentlab.symbols import Condition, Relation, Sym, column
 from crescentlab.system import Bits, System, SystemEvent, Variable
+from crescentlab.time_alone import NAME as TIME_ALONE
+from crescentlab.time_alone import TimeAlone, time_alone
 from crescentlab.trace import Layout, Trace, numeric_fields
 from crescentlab.units import Quantity
 
@@ -134,13 +137,15 @@ class _Assembly:
     def done(self) -> System:
         self.flow()
         derivative = self.every(lambda trace: trace.derivative)
-        clock = self.every(lambda trace: trace.clock)
         relations, scales = self.relations()
         events, conditions, periods = self.events()
+        derivative, timed = self.stops(derivative, relations, conditions)
         if self.plan.design.outputs:
             self.variables()  # a wrong output is told before the run
         extra = self.stop(events, conditions, relations, scales)
-        b = ca.vertcat(self.b, extra)
+        relations += timed.relations
+        scales += timed.scales
+        b = ca.vertcat(self.b, extra, *timed.bits)
         together = shared(ca.densify(column([derivative, *relations])))
         f, g = ca.vertsplit(together, [0, derivative.numel(), together.numel()])
         state_names, state_quantities = self.names(State)
@@ -158,7 +163,7 @@ class _Assembly:
             scales=column(scales),
             conditions=column(conditions),
             periods=periods,
-            clock=clock,
+            clock=timed.clock,
             events=tuple(events),
             state_names=state_names,
             state_quantities=state_quantities,
@@ -167,12 +172,13 @@ class _Assembly:
             held_quantities=held_quantities,
             counting_states=self.counting(State),
             counting_held=self.counting(Held),
-            bits=self.bits(g, b),
+            bits=self.bits(g, b, timed),
             _variables=self.variables,
             remapping=self.remap,
             reading=self.reading,
             _contents=self.contents(),
             _energies=self.energies,
+            outputs_by_part=self.outputs_by_part,
             _passing=lambda: {n: self.flows(n) for n, c in self.plan.components.items() if passes_fluid(type(c))},
         )
 
@@ -261,17 +267,31 @@ class _Assembly:
         self.stop_strict = ["=" not in r.operator for r, _ in found]
         return column([symbol for _, symbol in found])
 
-    def bits(self, g: ca.SX, b: ca.SX) -> Bits:
+    def stops(self, derivative: ca.SX, relations: list[ca.SX], conditions: list[ca.SX]) -> tuple[ca.SX, TimeAlone]:
+        """Put bits in place of the conditions on time in all that has been assembled; the derivative with them."""
+        parts = [self.outputs, self.inputs, derivative, *relations, *conditions]
+        ends = np.cumsum([0, *(part.numel() for part in parts)]).tolist()
+        timed = time_alone(ca.densify(column(parts)), self.t, self.x, ca.vertcat(self.h, self.b), ends[3])
+        if timed.bits:
+            places = itertools.pairwise(ends)
+            self.outputs, self.inputs, derivative, *rest = (timed.expression[low:high] for low, high in places)
+            relations[:], conditions[:] = rest[: len(relations)], rest[len(relations) :]
+        return derivative, timed
+
+    def bits(self, g: ca.SX, b: ca.SX, on_time: TimeAlone) -> Bits:
         n = g.numel()
         names = [f"{name}: {info.text}" for name, tr in self.plan.traces.items() for info in tr.relations]
         strict = [info.strict for tr in self.plan.traces.values() for info in tr.relations]
         extra = getattr(self, "stop_strict", [])
         names += ["stop_when"] * len(extra)
-        strict += extra
-        switches = [info.switches for tr in self.plan.traces.values() for info in tr.relations] + [False] * len(extra)
+        names += [TIME_ALONE] * len(on_time.bits)
+        strict += extra + on_time.strict
+        switches = [info.switches for tr in self.plan.traces.values() for info in tr.relations]
+        switches += [False] * (len(extra) + len(on_time.bits))
         on_state = _depends(g, self.x) if n else np.zeros(0, bool)
         timed = (_depends(g, self.t) if n else np.zeros(0, bool)) & ~on_state
         curved = np.array(ca.which_depends(g, self.t, 2, True), bool) if n and timed.any() else np.zeros(n, bool)
+        curved[n - len(on_time.bits) :] = ~np.array(on_time.straight, bool)
         held = _depends(g, ca.vertcat(self.h, b)) if n else np.zeros(0, bool)
         return Bits(
             tuple(names), np.array(strict, bool), on_state, timed, timed & ~curved, held, np.array(switches, bool)
@@ -469,6 +489,12 @@ class _Assembly:
                         functools.partial(self.flows, name),
                     )
         return found
+
+    def outputs_by_part(self) -> list[tuple[str, ca.SX]]:
+        """What each step of the plan's order gives, by component."""
+        steps = [step for wave in self.plan.order for step in wave]
+        groups = [(step.instance, self.plan.traces[step.instance].groups[step.group]) for step in steps]
+        return [(name, self.outputs.nz[self.output_of.places([name], group.outputs)]) for name, group in groups]
 
     def energies(self) -> dict[str, ca.SX]:
         """Per component through which power passes, its five rows of the ledger."""

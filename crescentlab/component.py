@@ -94,8 +94,21 @@ class Component(BaseModel):
 
     @classmethod
     def forms(cls) -> list[type[Component]]:
-        """The causal forms of a family; for a plain class, itself."""
-        return [form for sub in cls.__subclasses__() for form in sub.forms()] if cls.family else [cls]
+        """The causal forms of a family, defined in its own module or package; for a plain class, itself.
+
+        What others derive from the family is theirs: see :meth:`crescentlab.library.Library.forms`.
+        """
+        if not cls.family:
+            return [cls]
+        return [form for sub in cls.__subclasses__() if _together(sub, cls) for form in sub.forms()]
+
+    @property
+    def unbalanced(self) -> str:
+        """Why its volumes do not follow its flows, so that the ledgers of a run with it cannot close; empty if they do.
+
+        A class whose simplification breaks the balance overrides it.
+        """
+        return ""
 
     @classmethod
     def asks_for(cls) -> list[str]:
@@ -127,6 +140,10 @@ class Component(BaseModel):
             raise ComponentError(f"{type(self).__name__}: size {value!r} is not a whole number from 0")
         return int(value)
 
+    def remarks(self, stop: float) -> list[str]:
+        """Sentences that `check` adds about this part in a run until ``stop`` [s]; a class says what is worth one."""
+        return []
+
     def quantity(self, quantity: Quantity | str) -> Quantity:
         """A declared quantity, looked up in this component's field where it is named by one."""
         return units.quantity_named(str(getattr(self, quantity))) if isinstance(quantity, str) else quantity
@@ -143,6 +160,13 @@ class Component(BaseModel):
             value = start
         n = self.size_of(declared.size)
         return np.broadcast_to(np.asarray(value, dtype=float), (1 if n is None else n,)).copy()
+
+
+def _together(one: type, other: type) -> bool:
+    """Whether two classes are of one module, or of modules of one package."""
+    home, away = one.__module__, other.__module__
+    package = home.rpartition(".")[0]
+    return home == away or (bool(package) and package == away.rpartition(".")[0])
 
 
 @functools.cache

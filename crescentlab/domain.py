@@ -193,6 +193,13 @@ class Held(Declared):
 
 
 @dataclass(eq=False)
+class Scheduled(Held):
+    """A held vector that follows a schedule, by the method ``by`` of its component: (start, stop) -> Schedule."""
+
+    by: str = ""
+
+
+@dataclass(eq=False)
 class Observable(Declared):
     """A returned value that a result can show; ``entry`` says what it enters in the ledgers of fluid and energy."""
 
@@ -229,6 +236,15 @@ def held(
 ) -> Any:  # fmt: skip
     """A held value, changed only by ``when`` and ``every``; for ``counts`` see :func:`state`."""
     return Held(_named(quantity), description, start, size, counts)
+
+
+def scheduled(description: str, *, by: str, size: Size) -> Any:
+    """A held vector that takes the rows of a :class:`crescentlab.schedule.Schedule`, each at its instant.
+
+    ``by`` names the component's method (start, stop) -> Schedule, which covers a run between these times [s]. The rows
+    are plain numbers: what they are made from must be structural.
+    """
+    return Scheduled(units.ratio, description, 0.0, size, counts=False, by=by)
 
 
 def observable(quantity: Any, description: str, *, size: Size | None = None) -> Any:

@@ -13,9 +13,11 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from pydantic.fields import FieldInfo
 
+from crescentlab.arguments import Settings
 from crescentlab.component import Component, field_quantity, is_structural
-from crescentlab.domain import Held, Observable, Port, State
+from crescentlab.domain import Held, Observable, Port, Scheduled, State
 from crescentlab.errors import ComponentError, ExpressionError, InputError, Place, UnitError, nearest
 from crescentlab.explain import validated
 from crescentlab.expressions import Value, evaluate, is_expression, number_of
@@ -37,6 +39,8 @@ class Instance:
     component: Component
     place: Place | None
     start: dict[str, np.ndarray] = field(default_factory=dict)
+    forms: tuple[type[Component], ...] = ()
+    """Of a family, the causal forms that the library of its file has; of another class, itself."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -85,12 +89,12 @@ class Design:
     outputs: list[Output]
     parameters: dict[str, dict[str, Value]]
     """Parameter values per scope ('' is the circuit's own)."""
+    warnings: tuple[str, ...] = ()
+    """What the text has that will not do what its writer may think."""
 
 
-def elaborate(
-    netlist: Netlist, library: Library, settings: Mapping[str, str] | None = None, *, no_code: bool = False
-) -> Design:
-    """Flatten ``netlist``; ``settings`` are ``--set`` texts by dotted name.
+def elaborate(netlist: Netlist, library: Library, settings: Settings | None = None, *, no_code: bool = False) -> Design:
+    """Flatten ``netlist``; ``settings`` are ``--set`` texts, or numbers in SI, by dotted name.
 
     Raises :class:`InputError` with file and line for whatever in the files, or ``--set`` for whatever
     in the settings, cannot be used.
@@ -105,22 +109,22 @@ def elaborate(
 
 
 class _Overrides:
-    """Texts given by ``--set``; each must be used by something."""
+    """Texts and numbers given by ``--set`` or from Python; each must be used by something."""
 
-    def __init__(self, texts: dict[str, str]) -> None:
-        self.texts = texts
+    def __init__(self, values: dict[str, Any]) -> None:
+        self.values = values
         self.used: set[str] = set()
         self.known: set[str] = set()
 
-    def take(self, name: str) -> str | None:
+    def take(self, name: str) -> Any:
         self.known.add(name)
-        if name in self.texts:
+        if name in self.values:
             self.used.add(name)
-            return self.texts[name]
+            return self.values[name]
         return None
 
     def check_used(self) -> None:
-        for name in self.texts:
+        for name in self.values:
             if name not in self.used:
                 raise InputError(f"--set {name}: nothing has this name: {nearest(name, self.known)}")
 
@@ -185,9 +189,7 @@ class _Elaboration:
                     netlist, section.type, node, full, values, library, overrides, chain
                 )
             else:
-                self.component(
-                    netlist, library.component(section.type, node.place_of("type")), node, full, values, overrides
-                )
+                self.component(netlist, library, section.type, node, full, values, overrides)
         for name, net in sections.nets.items():
             self.net(netlist, prefix, name, net, inner_ports)
         for name in sections.outputs:
@@ -201,12 +203,14 @@ class _Elaboration:
     def component(
         self,
         netlist: Netlist,
-        cls: type[Component],
+        library: Library,
+        kind: str,
         node: Node,
         full: str,
         values: dict[str, Value],
         overrides: _Overrides,
     ) -> None:
+        cls = library.component(kind, node.place_of("type"))
         lookup = _scope_lookup(values, netlist)
         instance = self.instance(cls, node, lookup, overrides, full, netlist.folder)
         try:
@@ -214,7 +218,9 @@ class _Elaboration:
                 instance.size_of(declared.size)
         except ComponentError as error:
             raise InputError(f"{full}: {error}", node.place) from None
-        stateful = {s.name: s for form in cls.forms() for s in form.declared(State) + form.declared(Held)}
+        forms = library.forms(cls)
+        begins = [s for form in forms for s in form.declared(State) + form.declared(Held)]
+        stateful = {s.name: s for s in begins if not isinstance(s, Scheduled)}
         start: dict[str, np.ndarray] = {}
         given = node.value["start"].value if isinstance(node.value, dict) and "start" in node.value else {}
         assert isinstance(given, dict)  # as the netlist checked
@@ -224,14 +230,16 @@ class _Elaboration:
                     f"{full}: no state {name!r} to start: {nearest(name, stateful)}", node.place_of("start", name)
                 )
         for name, declared in stateful.items():
-            text = overrides.take(f"{full}.start.{name}")
-            source = Node(text, COMMAND) if text is not None else given.get(name)
-            if source is not None:
+            setting = overrides.take(f"{full}.start.{name}")
+            source = Node(setting, COMMAND) if isinstance(setting, str) else given.get(name)
+            subject = f"{'--set ' if setting is not None else ''}{full}.start.{name}"
+            if setting is not None and not isinstance(setting, str):
+                start[name] = _si(setting, subject)
+            elif source is not None:
                 quantity = instance.quantity(declared.quantity)
                 items = source.value if isinstance(source.value, list) else [source]
-                subject = f"{'--set ' if text is not None else ''}{full}.start.{name}"
                 start[name] = np.array([_number(str(i.value), quantity, lookup, subject, i.place) for i in items])
-        self.instances[full] = Instance(full, instance, node.place, start)
+        self.instances[full] = Instance(full, instance, node.place, start, tuple(forms))
 
     def instance(self, cls: type[Any], node: Node, lookup: Any, overrides: _Overrides, full: str, folder: Path) -> Any:
         """Validate a component or fluid; expressions become numbers first, ``--set`` texts replace.
@@ -244,15 +252,20 @@ class _Elaboration:
         given = {name: child for name, child in node.value.items() if name not in kept}
         from_command: set[str] = set()
         fields = {info.alias or name: info for name, info in cls.model_fields.items()}
-        for name in fields:
-            text = overrides.take(f"{full}.{name}")
-            if text is not None:
-                given[name] = Node(text, COMMAND)
+        numbers: dict[str, Any] = {}
+        for name, info in fields.items():
+            setting = overrides.take(f"{full}.{name}")
+            if setting is not None:
                 from_command.add(name)
+                if not isinstance(setting, str):
+                    numbers[name] = _written(setting, info, given.get(name), lookup, f"--set {full}.{name}")
+                given[name] = Node(str(setting), COMMAND)
         for name, child in given.items():
-            info = fields.get(name)
+            found = fields.get(name)
             where = f"--set {full}.{name}" if name in from_command else f"{full}.{name}"
-            data[name] = _plain(child, info, lookup, where) if info is not None else child.plain()
+            data[name] = numbers.get(name)
+            if data[name] is None:
+                data[name] = _plain(child, found, lookup, where) if found is not None else child.plain()
         key = cls, folder, repr(data)
         if key in self.made:
             return self.made[key]
@@ -414,9 +427,12 @@ def _parameter_values(
                 raise ExpressionError(f"parameters depend on each other: {' -> '.join([*running, name])}")
             running.append(name)
             place = netlist.place("parameters", name)
-            text = overrides.take(prefix + name)
-            if text is not None:
-                values[name] = _value(text, find, f"--set {prefix}{name}", COMMAND, _kind(texts[name]))
+            setting = overrides.take(prefix + name)
+            if isinstance(setting, str):
+                values[name] = _value(setting, find, f"--set {prefix}{name}", COMMAND, _kind(texts[name]))
+            elif setting is not None:
+                own = _value(texts[name], find, name, place)
+                values[name] = _si_value(setting, own, f"--set {prefix}{name}")
             elif name in passed:
                 values[name] = passed[name]
             else:
@@ -452,6 +468,37 @@ def _value(text: str, lookup: Any, subject: str, place: Place | None, kind: Quan
         return Value(text)
     except InputError as error:
         raise _described(error, subject, place) from None
+
+
+def _si(setting: Any, subject: str) -> np.ndarray:
+    """Start values handed over as numbers."""
+    array = np.atleast_1d(np.asarray(setting))
+    if array.ndim != 1 or array.dtype.kind not in "if":
+        raise InputError(f"{subject}: write one number in SI, or a list of them")
+    return array.astype(float)
+
+
+def _si_value(setting: Any, own: Value, subject: str) -> Value:
+    """A circuit parameter handed over as a number: of the quantity that its own value has."""
+    if isinstance(own.value, str) and not isinstance(setting, bool):
+        raise InputError(f"{subject}: {setting} is a number, where a word such as {own.value!r} belongs")
+    if isinstance(setting, (tuple, bool)):
+        raise InputError(f"{subject}: write one number in SI, or text with a unit")
+    return Value(float(setting), own.quantity, own.written)
+
+
+def _written(setting: Any, info: FieldInfo, own: Node | None, lookup: Any, subject: str) -> Any:
+    """A component's parameter handed over as a number, as pydantic takes it."""
+    if field_quantity(info) is not None:
+        if isinstance(setting, bool):
+            raise InputError(f"{subject}: {setting} is no number; write one in SI, or text with a unit")
+        return setting
+    if is_structural(info) or own is None or not isinstance(own.value, str) or isinstance(setting, (tuple, bool)):
+        return list(setting) if isinstance(setting, tuple) else setting
+    # the component reads the quantity off the unit that the circuit wrote
+    text = _plain(own, info, lookup, subject)
+    unit = parse_any(text)[1].si if isinstance(text, str) and is_number(text) else ""
+    return f"{float(setting)!r} {unit if unit != '1' else ''}".strip()
 
 
 def _described(error: InputError, subject: str, place: Place | None) -> InputError:

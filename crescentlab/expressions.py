@@ -52,10 +52,13 @@ def is_expression(text: str) -> bool:
     return text.startswith("=")
 
 
-def evaluate(text: str, lookup: Lookup, functions: Mapping[str, Function] | None = None) -> Value:
+def evaluate(
+    text: str, lookup: Lookup, functions: Mapping[str, Function] | None = None,
+    where: Callable[[Any, Any, Any], Any] = maths.where,
+) -> Value:  # fmt: skip
     """Value of ``text`` (a leading ``=`` is allowed); names are found by ``lookup(name)``.
 
-    ``functions`` are known besides those of every expression, and before them.
+    ``functions`` are known besides those of every expression, and before them; ``where`` makes the choices.
 
     Raises :class:`ExpressionError` for anything but arithmetic, for clashing dimensions, a division
     by zero, or a result that is not finite.
@@ -72,7 +75,7 @@ def evaluate(text: str, lookup: Lookup, functions: Mapping[str, Function] | None
         return lookup(name)
 
     try:
-        result = _Walker(body, find, functions or {}).visit(tree)
+        result = _Walker(body, find, functions or {}, where).visit(tree)
     except ZeroDivisionError:
         raise ExpressionError(f"{shown} divides by zero") from None
     except (OverflowError, FloatingPointError):
@@ -180,8 +183,10 @@ _COMPARE: dict[type[ast.cmpop], Callable[[Any, Any], Any]] = {
 class _Walker:
     """Evaluates the allowed nodes and refuses all others."""
 
-    def __init__(self, body: str, find: Lookup, functions: Mapping[str, Function]) -> None:
-        self.body, self.find, self.functions = body, find, functions
+    def __init__(
+        self, body: str, find: Lookup, functions: Mapping[str, Function], where: Callable[[Any, Any, Any], Any]
+    ) -> None:
+        self.body, self.find, self.functions, self.where = body, find, functions, where
         self.depth = 0
 
     def fail(self, message: str) -> ExpressionError:
@@ -271,7 +276,7 @@ class _Walker:
             raise self.fail(f"unknown function {name!r}: {nearest(name, known)}")
         if name == "where" and len(arguments) == 3:
             a, b = self.alike(self.number(arguments[1]), self.number(arguments[2]), "choose between")
-            return Value(_float(maths.where(self.condition(arguments[0]), a.value, b.value)), a.quantity)
+            return Value(_float(self.where(self.condition(arguments[0]), a.value, b.value)), a.quantity)
         values = [self.number(a) for a in arguments]
         if name in _SAME and len(values) >= 2:
             result = values[0]

@@ -30,6 +30,9 @@ pi = float(np.pi)
 class Tracer(Protocol):
     """Collects relations while a component is traced."""
 
+    halvings: dict[tuple[int, bytes], tuple[ca.SX, list[ca.SX]]]
+    """Answers that tables have asked for, by place in the graph and knots: a table asked twice has them once."""
+
     def bit(self, relation: Relation) -> ca.SX:
         """The frozen bit (0 or 1) that stands for ``relation``."""
         ...
@@ -217,12 +220,58 @@ def table(x: Any, knots: Sequence[float], values: Sequence[float], *, flag_knots
     kink inside a step would limit every solver's accuracy; ``flag_knots=False`` leaves them out.
     """
     xs, ys = np.asarray(knots, dtype=float), np.asarray(values, dtype=float)
-    slopes = np.diff(ys) / np.diff(xs)
+    lines = np.column_stack([ys[:-1], np.diff(ys) / np.diff(xs)])
+    return piecewise(x, xs[1:-1], xs[:-1], lines, flag_knots=flag_knots)
+
+
+def piecewise(
+    x: Any, knots: np.ndarray, origins: np.ndarray, coefficients: np.ndarray, *, flag_knots: bool = True
+) -> Any:
+    """The polynomial sum_j c_kj (x - o_k)^j of the piece k that x lies in; piece k ends at ``knots[k]``.
+
+    ``knots`` (m - 1,) increasing, ``origins`` o (m,), ``coefficients`` c (m, degree + 1); at a knot the piece after it.
+    While tracing, a knot is an event unless ``flag_knots`` is False. The piece is found by halving, so that a table of
+    m pieces has ceil(log2 m) relations, each between x and the knot that the answers before it leave, and costs about
+    10 m instructions.
+    """
     if not isinstance(x, Sym):
-        piece = np.clip(np.searchsorted(xs, x, side="right") - 1, 0, len(slopes) - 1)
-        return (ys[piece] + slopes[piece] * (np.asarray(x) - xs[piece]))[()]
-    choose = event_where if flag_knots and TRACER.get() is not None else where
-    y: Any = ys[0] + slopes[0] * (x - xs[0])
-    for k in range(1, len(slopes)):
-        y = choose(x > xs[k], ys[k] + slopes[k] * (x - xs[k]), y)
+        k = np.searchsorted(knots, x, side="right")
+        d, result = np.asarray(x) - origins[k], 0.0
+        for j in reversed(range(coefficients.shape[1])):
+            result = result * d + coefficients[k, j]
+        return np.asarray(result)[()]
+    if x.shape:
+        return stack(*[piecewise(each, knots, origins, coefficients, flag_knots=flag_knots) for each in x])
+    answers = _halving(x, knots, TRACER.get() if flag_knots else None)
+    o, *c = (Sym(_chosen(column, answers)) for column in (origins, *coefficients.T))
+    y = c[-1]
+    for each in reversed(c[:-1]):
+        y = y * (x - o) + each
     return y
+
+
+def _halving(x: Sym, knots: np.ndarray, tracer: Tracer | None) -> list[ca.SX]:
+    """Answers to "beyond the middle knot?", first of all pieces, then of the half that is left: the piece in binary."""
+    key = (x.sx.element_hash(), knots.tobytes())
+    if tracer is not None and key in tracer.halvings:
+        return tracer.halvings[key][1]
+    answers: list[ca.SX] = []
+    depth = int(knots.size).bit_length()
+    for level in range(depth):
+        half = 2 ** (depth - level - 1)
+        middles = np.minimum(np.arange(half, knots.size + 1 + half, 2 * half), knots.size) - 1
+        beyond = x >= Sym(_chosen(knots[middles], answers))
+        answers.append(beyond.lower(tracer.bit if tracer is not None else None))
+    if tracer is not None:
+        tracer.halvings[key] = (x.sx, answers)
+    return answers
+
+
+def _chosen(values: np.ndarray, answers: list[ca.SX]) -> ca.SX:
+    """The value whose number the answers spell in binary, the last being its lowest digit."""
+    left = ca.SX(np.asarray(values, dtype=float))
+    for answer in reversed(answers):
+        pairs = left.numel() // 2
+        low, high = left[0 : 2 * pairs : 2], left[1 : 2 * pairs : 2]
+        left = ca.vertcat(ca.if_else(answer, high, low), left[2 * pairs :]) if pairs else left
+    return left

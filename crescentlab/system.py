@@ -20,11 +20,12 @@ import numpy as np
 from crescentlab.causality import Plan
 from crescentlab.columns import Columns
 from crescentlab.component import Component
-from crescentlab.domain import Held, State
+from crescentlab.domain import Held, Scheduled, State
 from crescentlab.elaborate import Design
 from crescentlab.energy import keeps_books, power_ports
 from crescentlab.errors import InputError, nearest
 from crescentlab.prepared import LARGE, Prepared, jacobian, prepare, shared
+from crescentlab.schedule import Following
 from crescentlab.symbols import column
 from crescentlab.trace import numeric_fields, structure_of
 from crescentlab.units import Quantity
@@ -80,6 +81,8 @@ class Values:
     x0: Array
     h0: Array
     start_time: float = 0.0
+    following: tuple[Following, ...] = ()
+    """Held values that follow a schedule."""
 
 
 @dataclass(eq=False)
@@ -119,6 +122,8 @@ class System:
     _contents: dict[str, tuple[Callable[[], ca.SX], Callable[[], tuple[ca.SX, ca.SX]]]]
     _energies: Callable[[], dict[str, ca.SX]]
     _passing: Callable[[], dict[str, tuple[ca.SX, ca.SX]]]
+    outputs_by_part: Callable[[], list[tuple[str, ca.SX]]]
+    """What each component gives at its ports, in the order in which it is evaluated."""
     _once: dict[Any, Any] = field(default_factory=dict)
     built: dict[tuple[str, str], Prepared] = field(default_factory=dict)
     """Functions that have been compiled, by name and form (see :mod:`crescentlab.solvers.promotion`)."""
@@ -245,6 +250,7 @@ class System:
             p += [float(getattr(fluid, n)) for n in numeric_fields(type(fluid), fluid)]
         x0: list[Array] = []
         h0: list[Array] = []
+        following: list[Following] = []
         for name, shape in self.plan.components.items():
             instance = design.instances[name]
             component = instance.component
@@ -260,11 +266,16 @@ class System:
                 _start(instance.start, s, component, mine, name, instance.place)
                 for s in type(component).declared(State)
             ]
-            h0 += [
-                _start(instance.start, s, component, mine, name, instance.place) for s in type(component).declared(Held)
-            ]
+            for s in type(component).declared(Held):
+                at = sum(a.size for a in h0)
+                h0.append(_start(instance.start, s, component, mine, name, instance.place))
+                if isinstance(s, Scheduled):
+                    following.append(Following(slice(at, at + h0[-1].size), getattr(component, s.by)))
         p += [float(design.parameters[scope][name].value) for scope, name in self.output_parameters]
-        values = Values(np.array(p), _join(x0), _join(h0))
+        values = Values(np.array(p), _join(x0), _join(h0), following=tuple(following))
+        for each in following:
+            schedule = each.schedule(values.start_time, values.start_time)
+            values.h0[each.places] = schedule.rows[schedule.at(values.start_time)]
         ticks = [event.name for event in self.events if event.kind == "every"]
         for tick, period in zip(ticks, np.array(self.period(values.p)).ravel() if ticks else (), strict=True):
             if not period > 0:

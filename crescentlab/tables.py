@@ -6,9 +6,8 @@ first line names two columns with units, ``pressure [bar], deflection [mm]``.
 
 from __future__ import annotations
 
-import csv
+from collections.abc import Sequence
 from dataclasses import dataclass
-from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -17,12 +16,9 @@ from pydantic import BaseModel, ConfigDict, GetCoreSchemaHandler, ValidationInfo
 from pydantic_core import CoreSchema, PydanticCustomError, core_schema
 
 from crescentlab import maths
-from crescentlab.errors import InputError, Place, UnitError
-from crescentlab.symbols import Sym
-from crescentlab.units import QUANTITIES, Quantity, normalise, parse_any
-
-MAX_POINTS = 2000
-"""A piecewise-linear curve lives in the expression graph, so its length is bounded."""
+from crescentlab.data_files import open_data, whole
+from crescentlab.errors import InputError, Place
+from crescentlab.units import QUANTITIES, Quantity, parse_any
 
 
 class Curve(BaseModel):
@@ -43,27 +39,16 @@ class Curve(BaseModel):
 
     def slope(self, x: Any) -> Any:
         """dy/dx, constant between knots (the right-hand slope at a knot)."""
-        slopes = np.diff(self.y) / np.diff(self.x)
-        if not isinstance(x, Sym):
-            piece = np.clip(np.searchsorted(self.x, x, side="right") - 1, 0, len(slopes) - 1)
-            return slopes[piece][()]
-        result: Any = float(slopes[0])
-        for k in range(1, len(slopes)):
-            result = maths.event_where(x > self.x[k], float(slopes[k]), result)
-        return result
+        xs = np.array(self.x)
+        slopes = np.diff(self.y) / np.diff(xs)
+        return maths.piecewise(x, xs[1:-1], xs[:-1], slopes[:, None])
 
     def work(self, x: Any) -> Any:
         """Integral of x dy from the first point on: what moving something by y against x takes."""
-        knots, slopes = np.array(self.x), np.diff(self.y) / np.diff(self.x)
-        before = np.concatenate([[0.0], np.cumsum(slopes * np.diff(knots**2) / 2)])
-        if not isinstance(x, Sym):
-            piece = np.clip(np.searchsorted(knots, x, side="right") - 1, 0, len(slopes) - 1)
-            return (before[piece] + slopes[piece] * (np.asarray(x) ** 2 - knots[piece] ** 2) / 2)[()]
-        result: Any = float(slopes[0]) * (x * x - knots[0] ** 2) / 2
-        for k in range(1, len(slopes)):
-            here = float(before[k]) + float(slopes[k]) * (x * x - knots[k] ** 2) / 2
-            result = maths.event_where(x > self.x[k], here, result)
-        return result
+        xs = np.array(self.x)
+        slopes = np.diff(self.y) / np.diff(xs)
+        before = np.concatenate([[0.0], np.cumsum(slopes * np.diff(xs**2) / 2)[:-1]])
+        return maths.piecewise(x, xs[1:-1], xs[:-1], np.column_stack([before, slopes * xs[:-1], slopes / 2]))
 
 
 @dataclass(frozen=True)
@@ -75,6 +60,8 @@ class CurveOf:
 
     x: Quantity | None = None
     y: Quantity | None = None
+    jumps: bool = False
+    """Whether two points may have one x."""
 
     def __get_pydantic_core_schema__(self, source: Any, handler: GetCoreSchemaHandler) -> CoreSchema:
         """Read inline data or a CSV file, relative to the folder in the validation context."""
@@ -84,11 +71,11 @@ class CurveOf:
         try:
             if isinstance(value, str) and value:
                 folder = Path((info.context or {}).get("folder", "."))
-                return read_csv(folder / value, self.x, self.y)
+                return read_csv(folder / value, self.x, self.y, jumps=self.jumps)
             if isinstance(value, dict) and {"x", "y"} <= set(value) <= set(Curve.model_fields):
                 xs, x_quantity = _column(value["x"], self.x, "x")
                 ys, y_quantity = _column(value["y"], self.y, "y")
-                return _curve(xs, ys, x_quantity, y_quantity)
+                return _curve(xs, ys, x_quantity, y_quantity, self.jumps)
         except InputError as error:
             at = {"file": error.place.file, "line": error.place.line} if error.place else {}
             raise PydanticCustomError("curve", "{reason}", {"reason": error.message, **at}) from None
@@ -113,68 +100,41 @@ def _column(items: Any, quantity: Quantity | None, name: str) -> tuple[list[floa
     return values, quantity or QUANTITIES["ratio"]
 
 
-def _curve(xs: list[float], ys: list[float], x: Quantity, y: Quantity, places: list[Place] | None = None) -> Curve:
+def _curve(
+    xs: list[float], ys: list[float], x: Quantity, y: Quantity, jumps: bool, places: Sequence[Place] = ()
+) -> Curve:
     """The checked curve; ``places`` are the lines of its points."""
     if len(xs) != len(ys):
         raise InputError(f"{len(xs)} values of x and {len(ys)} of y; write as many of each")
     if len(xs) < 2:
         raise InputError("a curve needs at least two points")
-    if len(xs) > MAX_POINTS:
-        raise InputError(f"{len(xs)} points; a curve may have {MAX_POINTS}, so thin it out")
-    unit = next(iter(x.units))
-    for k, (first, second) in enumerate(pairwise(xs)):
-        if not second > first:
-            said = f"x must rise from point to point, but {x.show(second, unit)} follows {x.show(first, unit)}"
-            raise InputError(f"{said}; sort the points", places[k + 1] if places else None)
+    steps = np.diff(xs)
+    wrong = np.flatnonzero(~(steps >= 0 if jumps else steps > 0))
+    if wrong.size or not np.any(steps > 0):
+        k = int(wrong[0]) if wrong.size else 0
+        unit = next(iter(x.units))
+        first, second = x.show(xs[k], unit), x.show(xs[k + 1], unit)
+        said = f"x must rise from point to point, but {second} follows {first}"
+        advice = "sort the points" if xs[k + 1] < xs[k] else "leave one of them out"
+        raise InputError(f"{said}; {advice}", places[k + 1] if places else None)
     return Curve(x=tuple(xs), y=tuple(ys), x_quantity=x.name, y_quantity=y.name)
 
 
-def read_csv(path: Path, x: Quantity | None = None, y: Quantity | None = None) -> Curve:
+def read_csv(path: Path, x: Quantity | None = None, y: Quantity | None = None, *, jumps: bool = False) -> Curve:
     """Read a two-column CSV file with units in its header; raises :class:`InputError` with the line."""
+    file = open_data(path, str(path))
+    if len(file.titles) != 2:
+        said = "the first line must name two columns with units, for example: pressure [bar], deflection [mm]"
+        raise InputError(f"{said}; a recorded_signal takes one of many columns by its name", file.top)
+    table = whole(file)
+    quantities, values = [], []
+    for k, (name, quantity) in enumerate(zip(table.columns, (x, y), strict=True)):
+        quantities.append(quantity or table.file.quantity(k))
+        values.append(table.numbers(name, quantities[k]))
+        for cell, place in zip(table.columns[name].cells, table.places, strict=True):
+            if not cell:
+                raise file.empty(k, place)
     try:
-        reader = csv.reader(path.read_text(encoding="utf-8-sig").splitlines())
-        rows = [(Place(str(path), reader.line_num), row) for row in reader if any(cell.strip() for cell in row)]
-    except OSError as error:
-        raise InputError(
-            f"cannot read the table {path.name}: {error.strerror}; it is looked for beside the circuit file"
-        ) from None
-    except (UnicodeDecodeError, csv.Error) as error:
-        raise InputError(f"the table {path.name} is not text in UTF-8 ({error})") from None
-    top = Place(str(path), 1)
-    if not rows or len(rows[0][1]) != 2:
-        said = "the first line must name two columns with units, separated by a comma"
-        raise InputError(f"{said}, for example: pressure [bar], deflection [mm]", top)
-    columns = [_header(title, quantity, path) for title, quantity in zip(rows[0][1], (x, y), strict=True)]
-    values: tuple[list[float], list[float]] = ([], [])
-    for place, row in rows[1:]:
-        if len(row) != 2 or not row[0].strip() or not row[1].strip():
-            said = "write two numbers separated by a comma, their decimals after a point"
-            raise InputError(f"{said}, not {','.join(row)!r}", place)
-        for cell, (quantity, unit), column in zip(row, columns, values, strict=True):
-            try:
-                column.append(quantity.parse(f"{float(cell)!r} {unit}"))
-            except (ValueError, UnitError):
-                raise InputError(f"{cell.strip()!r} is not a finite number", place) from None
-    try:
-        return _curve(*values, columns[0][0], columns[1][0], [place for place, _ in rows[1:]])
+        return _curve(values[0].tolist(), values[1].tolist(), quantities[0], quantities[1], jumps, table.places)
     except InputError as error:
-        raise error.at(top) from None
-
-
-def _header(title: str, quantity: Quantity | None, path: Path) -> tuple[Quantity, str]:
-    name, bracket, rest = title.partition("[")
-    unit = rest.partition("]")[0].strip() if bracket else ""
-    key = normalise(unit)
-    if quantity is not None:
-        try:
-            quantity.factor(unit, title.strip())
-        except UnitError as error:
-            raise error.at(Place(str(path), 1)) from None
-        return quantity, unit
-    for candidate in QUANTITIES.values():
-        if key in candidate.units:
-            return candidate, unit
-    raise InputError(
-        f"column {name.strip()!r}: unknown unit {unit!r}; write it in brackets, for example {name.strip()} [bar]",
-        Place(str(path), 1),
-    )
+        raise error.at(table.top) from None

@@ -128,8 +128,6 @@ class Trace:
     events: tuple[EventInfo, ...]
     condition: ca.Function
     period: ca.Function
-    clock: ca.Function
-    """Values inside the equations that depend on time alone."""
     books: ca.Function
     """Five rows of the ledger of energy, or none; see :func:`crescentlab.energy.books`."""
 
@@ -168,22 +166,29 @@ class _Bits:
     def __init__(self) -> None:
         self.symbols: list[ca.SX] = []
         self.relations: list[Relation] = []
+        self.halvings: dict[tuple[int, bytes], tuple[ca.SX, list[ca.SX]]] = {}
+        self.alike: dict[Any, list[tuple[ca.SX, ca.SX]]] = {}
+        """Differences of the sides, and their bits, of relations whose operator, shape and outermost terms agree."""
 
     def bit(self, relation: Relation) -> ca.SX:
-        difference = relation.lhs - relation.rhs
-        for known, symbol in zip(self.relations, self.symbols, strict=True):
-            same = known.lhs - known.rhs
-            if (
-                known.operator == relation.operator
-                and same.shape == difference.shape
-                and ca.is_equal(same.sx, difference.sx, 8)
-            ):
+        difference = (relation.lhs - relation.rhs).sx
+        ends = [_outline(difference[k]) for k in {0, difference.numel() - 1}]
+        known = self.alike.setdefault((relation.operator, relation.shape, *ends), [])
+        for same, symbol in known:
+            if ca.is_equal(same, difference, 8):
                 return symbol
-        n = relation.shape[0] if relation.shape else 1
-        symbol = ca.SX.sym(f"b{len(self.symbols)}", n)
+        symbol = ca.SX.sym(f"b{len(self.symbols)}", relation.shape[0] if relation.shape else 1)
         self.symbols.append(symbol)
         self.relations.append(relation)
+        known.append((difference, symbol))
         return symbol
+
+
+def _outline(term: ca.SX, depth: int = 3) -> Any:
+    """Operations, symbols and constants of a term down to a depth: what differs here is not equal."""
+    if term.is_leaf():
+        return float(term) if term.is_constant() else term.element_hash()
+    return (term.op(), *(_outline(term.dep(k), depth - 1) for k in range(term.n_dep()) if depth))
 
 
 def trace(component: Component, fluids: dict[str, Fluid]) -> Trace:
@@ -285,11 +290,6 @@ class _Tracing:
             {k.removeprefix("der_"): v for k, v in returned.items() if k.startswith("der_")}, self.states
         )
         observable = self.column(shown, self.observables)
-        clock = (
-            _time_only(ca.vertcat(derivative, y, *relations), self.t, ca.vertcat(self.x, self.h, b, self.u))
-            if "t" in self.cls.asks_for()
-            else ca.SX(0, 1)
-        )
         return Trace(
             self.cls, self.states, self.held, self.inputs, self.outputs, self.observables, self.parameters,
             self.fluid_names,
@@ -297,7 +297,7 @@ class _Tracing:
             tuple(infos),
             function("rel", ca.horzcat(column(relations), column(scales))), tuple(events),
             function("cond", column(conditions)),
-            function("period", column(periods)), function("clock", clock),
+            function("period", column(periods)),
             function("books", ca.cse(books(self.cls, shown, entering))),
         )  # fmt: skip
 
@@ -381,48 +381,6 @@ def _symbols(slots: Iterable[Slot]) -> ca.SX:
 def _text(relation: Relation) -> str:
     text = f"{relation.lhs.sx} {relation.operator} {relation.rhs.sx}"
     return text if len(text) < 80 else f"a relation {relation.operator}"
-
-
-def _time_only(value: ca.SX, t: ca.SX, others: ca.SX) -> ca.SX:
-    """The largest subexpressions of ``value`` that depend on t, in a curve, and on none of ``others``.
-
-    Walks the instructions once, marking each result by what it depends on.
-    """
-    free = list(ca.symvar(value))
-    walk = ca.Function("walk", free, [value])
-    names = [s.name() for s in free]
-    other_names = {s.name() for s in ca.symvar(others)}
-    kinds = {k: (1 if names[k] == "t" else 2 if names[k] in other_names else 0) for k in range(len(free))}
-    work: dict[int, int] = {}
-    expressions: dict[int, ca.SX] = {}
-    found: list[ca.SX] = []
-    for k in range(walk.n_instructions()):
-        op, ins, outs = walk.instruction_id(k), walk.instruction_input(k), walk.instruction_output(k)
-        if op == ca.OP_INPUT:
-            work[outs[0]], expressions[outs[0]] = kinds[ins[0]], free[ins[0]]
-        elif op == ca.OP_CONST:
-            work[outs[0]], expressions[outs[0]] = 0, ca.SX(walk.instruction_constant(k))
-        elif op == ca.OP_OUTPUT:
-            if work[ins[0]] == 1:
-                found.append(expressions[ins[0]])
-        else:
-            mark = max(work[i] for i in ins)
-            if mark == 2:
-                found += [expressions[i] for i in ins if work[i] == 1]
-            elif mark == 1:
-                values = [expressions[i] for i in ins]
-                expressions[outs[0]] = (
-                    ca.SX.unary(op, values[0]) if len(values) == 1 else ca.SX.binary(op, values[0], values[1])
-                )
-            work[outs[0]] = mark
-            if mark == 0:
-                values = [expressions.get(i, ca.SX(0)) for i in ins]
-                expressions[outs[0]] = (
-                    ca.SX.unary(op, values[0]) if len(values) == 1 else ca.SX.binary(op, values[0], values[1])
-                )
-    alone = column(found)
-    curved = ca.which_depends(alone, t, 2, True) if found else []
-    return column([alone[k] for k, bent in enumerate(curved) if bent])  # a straight line swings never
 
 
 def quantities(component: Component, kind: type[State] | type[Held] | type[Observable]) -> dict[str, Quantity]:

@@ -18,17 +18,17 @@ import pytest
 ROOT = Path(__file__).resolve().parents[1]
 
 LAYERS: tuple[tuple[str, ...], ...] = (
-    ("errors", "files", "symbols", "units", "maths", "compiler", "c_text", "prepared", "columns"),
-    ("tables", "fluid", "domain", "component", "energy"),
-    ("expressions", "yaml_text", "explain", "library", "netlist"),
+    ("errors", "files", "series_files", "symbols", "units", "maths", "compiler", "c_text", "prepared", "columns"),
+    ("schedule", "walk", "time_alone", "data_files", "tables", "fluid", "domain", "component", "energy"),
+    ("arguments", "expressions", "yaml_text", "explain", "library", "netlist"),
     ("elaborate",),
     ("graph", "trace", "contract"),
     ("causality",),
     ("system",),
-    ("assembly",),
+    ("assembly", "closed_sets"),
     ("solvers",),
     ("balance",),
-    ("result", "placement", "plotting", "schematic"),
+    ("result", "recorded", "placement", "plotting", "schematic"),
     ("circuit",),
     ("analysis",),
     ("studies", "report"),
@@ -43,7 +43,18 @@ A room is a module or a package directly under `crescentlab/`; `__init__` is the
 NEVER = {"result": {"system", "trace", "solvers"}}
 """Imports refused although the layers would allow them, types aside: a result is given its evaluator."""
 
-FOR_COMPONENTS = {"component", "domain", "errors", "expressions", "fluid", "maths", "tables", "units"}
+FOR_COMPONENTS = {
+    "component",
+    "data_files",
+    "domain",
+    "errors",
+    "expressions",
+    "fluid",
+    "maths",
+    "schedule",
+    "tables",
+    "units",
+}
 """Modules of the kernel that component files may import from."""
 
 FOR_PARAMETERS = {"numpy", "pydantic", "pydantic_core"}

@@ -13,7 +13,7 @@ from typing import Any
 from pydantic.fields import FieldInfo
 
 from crescentlab.commands.text import table
-from crescentlab.component import Component, field_quantity
+from crescentlab.component import Component, field_quantity, snake_case
 from crescentlab.domain import SIGNAL, Held, Observable, Port, Size, State
 from crescentlab.errors import InputError, nearest
 from crescentlab.fluid import Fluid
@@ -152,7 +152,11 @@ def _words(annotation: Any) -> list[str]:
     if origin in (list, tuple):
         return [f"list of {' or '.join(_words(arguments[0]))}"]
     name = getattr(annotation, "__name__", str(annotation))
-    return [{"int": "whole number", "float": "number", "str": "word", "bool": "true or false"}.get(name, name.lower())]
+    return [
+        {"int": "whole number", "float": "number", "str": "word", "bool": "true or false"}.get(
+            name, snake_case(name).replace("_", " ")
+        )
+    ]
 
 
 def default(field: FieldInfo) -> str:

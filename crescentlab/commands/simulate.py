@@ -20,7 +20,8 @@ from crescentlab.circuit import Circuit, load
 from crescentlab.cli import DONE, FAILED, INTERRUPTED
 from crescentlab.commands import arguments as shared
 from crescentlab.commands.text import counted, settings, table
-from crescentlab.result import Result, check_record, result_target
+from crescentlab.result import Result, check_record
+from crescentlab.series_files import result_target
 from crescentlab.units import QUANTITIES
 
 log = logging.getLogger("crescentlab")
@@ -117,14 +118,9 @@ def report(result: Result, target: Path | None) -> dict[str, Any]:
         "status": t.status, "final_time": float(t.steps.t[-1]), "wall_s": s.wall_s, "steps": s.steps,
         "evaluations": s.evaluations, "jacobians": s.jacobians, "events": s.events, "ticks": s.ticks,
         "restarts": s.restarts, "states": len(result.system.state_names),
-        "balance": balance.as_json() if balance else None, "warnings": warnings(result),
+        "balance": balance.as_json() if balance else None, "warnings": result.warnings,
         "file": str(target) if target else None, "error": t.error or None,
     }  # fmt: skip
-
-
-def warnings(result: Result) -> list[str]:
-    """What the run and its ledgers warn of."""
-    return [*result.trajectory.warnings, *(result.balance.warnings if result.balance else [])]
 
 
 def finite(value: Any) -> Any:
@@ -143,7 +139,7 @@ def summary(result: Result, target: Path | None, record: list[str], pictures: li
         more = len(result.net_pressures()) - MAX_NETS
         said = f"\n  and {counted(more, 'net')} more" if more > 0 else ""
         parts.append(table(rows, right=(2, 3, 4, 5), indent="  ") + said)
-    parts += [f"  warning: {warning}" for warning in warnings(result)]
+    parts += [f"  warning: {warning}" for warning in result.warnings]
     written = [f"  wrote {path}" for path in pictures]
     if target is not None:
         names = counted(len(result.chosen(record)), "variable")
@@ -164,6 +160,7 @@ def _facts(result: Result) -> list[tuple[str, str]]:
     ]
     if result.balance is not None:
         rows += _ledgers(result.balance)
+    rows += [("balance", f"none: {name}: {why}") for name, why in result.unbalanced.items()]
     return rows
 
 

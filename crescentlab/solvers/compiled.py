@@ -8,6 +8,7 @@ from __future__ import annotations
 import ctypes
 import time
 from collections.abc import Callable
+from typing import NoReturn
 
 import numpy as np
 
@@ -19,6 +20,7 @@ from crescentlab.solvers.diagnosis import Diagnosis
 from crescentlab.solvers.elimination import elimination
 from crescentlab.solvers.functions import Functions
 from crescentlab.solvers.hybrid import ZENO_SPAN, Hybrid
+from crescentlab.solvers.jumps import ROWS, Chatter
 from crescentlab.solvers.limits import PressureLimits
 from crescentlab.solvers.options import ANGLE_STEP, RESTART_SHARE, Options
 from crescentlab.solvers.pace import CLOCK_SWING, clock_pace
@@ -26,6 +28,7 @@ from crescentlab.solvers.promotion import Promotion
 from crescentlab.solvers.records import Records, on_grid
 from crescentlab.solvers.roots import waves
 from crescentlab.solvers.snapshot import Snapshot
+from crescentlab.solvers.storms import STORM_COUNT, STORM_STEPS, Storms
 from crescentlab.solvers.trajectory import Statistics, Trajectory
 from crescentlab.system import System, Values
 
@@ -67,7 +70,7 @@ def integrate(
     """
     run = _CompiledRun(system, values, options, progress)
     if start is not None:
-        run.resume(start)
+        run.hybrid.resume(start)
     return run.run()
 
 
@@ -92,13 +95,18 @@ class _CompiledRun:
         self.warnings += [notice] if (notice := self.promotion.before()) else []
         self.hybrid = Hybrid(system, values, options.start, options.stop)
         self.atol = options.rtol * system.nominal
-        self.diagnosis = Diagnosis(Functions(system, values), options.rtol, self.atol)
+        self.diagnosis = Diagnosis(Functions(system, values), options.rtol, self.atol, options.solver)
         self.limits = PressureLimits(system)
+        self.storms = Storms(system)
+        self.chatter = Chatter(system, values.p)
+        self.chatter_at = FIRST_BLOCK
+        self.chattering: str | None = None
         self.tension: str | None = None
         self.run_ = native.Run()
         self.set_sizes()
         self.set_functions()
         self.set_relations_and_events()
+        self.set_schedules()
         self.set_task()
         self.set_scratch()
         self.records = Records(self.run_, options.solver)
@@ -153,16 +161,40 @@ class _CompiledRun:
         r.curved = hybrid.curved.size
         r.curved_held = int(bool(r.curved) and bool(system.bits.held_dependent[hybrid.curved].any()))
         r.curved_next = self.options.start
+        r.give(storm_last=self.storms.last, storm_row=self.storms.row)
+        r.storm_steps, r.storm_count = STORM_STEPS, STORM_COUNT
         r.zeno_span = ZENO_SPAN * self.options.span
         r.last_event = -1
 
-    def resume(self, start: Snapshot) -> None:
-        """Begin where another run ended; its states and held values are the start values already."""
-        r, kept = self.run_, self.run_.kept
-        kept["b"][: r.n_bits] = start.b
-        kept["holds"][: r.n_conditions] = start.holds
-        kept["origin"][: r.n_ticks], kept["ticked"][: r.n_ticks] = start.clocks(self.hybrid.periods, r.tolerance)
-        r.resumed = 1
+    def set_schedules(self) -> None:
+        """What follows a schedule: all rows one below the other."""
+        r, following = self.run_, self.hybrid.following
+        schedules = [schedule for _, schedule in following]
+        sizes = np.array([schedule.times.size for schedule in schedules], dtype=int)
+        first = np.cumsum(sizes) - sizes
+        at = [schedule.at(self.options.start, self.hybrid.time_tolerance) for schedule in schedules]
+        r.n_schedules, r.schedule_width = len(schedules), max((s.rows.shape[1] for s in schedules), default=0)
+        rows = [np.pad(s.rows, ((0, 0), (0, r.schedule_width - s.rows.shape[1]))) for s in schedules]
+        r.give(
+            schedule_times=_real(np.concatenate([np.zeros(0), *(s.times for s in schedules)])),
+            schedule_rows=_real(np.concatenate([np.zeros((0, r.schedule_width)), *rows])),
+            schedule_at=_whole(first + np.array(at, dtype=int)), schedule_last=_whole(first + sizes - 1),
+            schedule_place=_whole([places.start for places, _ in following]),
+            schedule_size=_whole([places.stop - places.start for places, _ in following]),
+        )  # fmt: skip
+
+    def enter(self) -> None:
+        """Compute the start as for every solver, and let the loop go on from there."""
+        r, kept, hybrid = self.run_, self.run_.kept, self.hybrid
+        x = self.values.x0
+        self.diagnosis.check_finite(r.t, x, self.diagnosis.functions.rhs(r.t, x), "at the start")
+        x, names = hybrid.enter(r.t, x)
+        kept["x"][: r.n], kept["h"][: r.n_held], kept["b"][: r.n_bits] = x, hybrid.h, hybrid.b
+        kept["holds"][: r.n_conditions], r.finished = hybrid.holds, hybrid.finished
+        kept["origin"][: r.n_ticks], kept["ticked"][: r.n_ticks] = hybrid.origin, hybrid.ticked
+        places = {event.name: k for k, event in enumerate(self.system.events)}
+        kept["log_t"][: len(names)], kept["log_event"][: len(names)] = r.t, [places[name] for name in names]
+        r.events = r.logs = len(names)
 
     def end(self) -> Snapshot:
         """Where the run stands."""
@@ -213,6 +245,8 @@ class _CompiledRun:
         begun = self.begun = self.shown_at = time.perf_counter()
         status, error = "done", ""
         try:
+            with np.errstate(all="ignore"):
+                self.enter()
             status = self.advance()
         except SimulationError as problem:
             t = self.run_.t
@@ -250,17 +284,17 @@ class _CompiledRun:
             block = max(1, min(2 * block, MOST_BLOCK, round(block * LOOK / pause)))
             self.hybrid.h, self.hybrid.b = r.kept["h"][: r.n_held].copy(), r.kept["b"][: r.n_bits].copy()
             self.drain()
+            self.warnings += self.storms.look(r.t)
             if code in ("DONE", "STOPPED"):
                 return code.lower()
             if code == "NEEDS_ROOT":
                 self.find_root()
             elif code != "PAUSED":
                 self.fail(code)
+            elif self.chattering:
+                raise SimulationError(self.chattering)
             elif self.records.size > MOST_BYTES:
-                raise SimulationError(
-                    f"its {r.steps} steps fill {self.records.size / 1e9:.1f} GB; "
-                    "an implicit solver takes fewer (--solver rodas), or simulate a shorter time"
-                )
+                self.fail_full()
             self.report()
 
     def find_root(self) -> None:
@@ -288,9 +322,14 @@ class _CompiledRun:
         return self.run_.kept["x"][: self.run_.n].copy()
 
     def drain(self) -> None:
-        """Take what was recorded, and look whether fluids that may were under tension."""
+        """Take what was recorded, and look whether fluids that may were under tension, or a choice chatters."""
         block = self.records.drain()
-        if block is None or self.tension:
+        if block is None:
+            return
+        if self.run_.steps >= self.chatter_at:
+            self.chatter_at *= 2
+            self.chattering = self.chattering or self.chatter.look(*self.records.last(ROWS))
+        if self.tension:
             return
         held = block["world_h"][block["row_world"]]
         for rows, kind in ((block["row_x"], self.limits.states), (held, self.limits.held)):
@@ -328,7 +367,18 @@ class _CompiledRun:
         if code == "IMPOSSIBLE_HELD":
             self.limits.check(t, x, hybrid.h)
         self.diagnosis.check_finite(t, x, self.diagnosis.functions.rhs(t, x))
-        raise SimulationError(f"no step is small enough; {self.diagnosis.blame(t, x)}")
+        reason = self.chatter.look(*self.records.last(ROWS), throughout=False) or self.diagnosis.blame(t, x)
+        raise SimulationError(f"no step is small enough; {reason}")
+
+    def fail_full(self) -> NoReturn:
+        """End a run whose records have grown too large."""
+        limited = self.run_.kept["limited"][: self.run_.n]
+        most = f", most of them limited by {self.system.state_names[int(np.argmax(limited))]}," if limited.any() else ""
+        advice = "take an implicit solver (--solver rodas)" if self.options.solver == "dopri" else "take a larger rtol"
+        raise SimulationError(
+            f"its {self.run_.steps} steps{most} fill {self.records.size / 1e9:.1f} GB; "
+            f"{advice}, or simulate a shorter time"
+        )
 
     def last_events(self, count: int) -> list[str]:
         """Names of the last events, each once."""

@@ -7,13 +7,23 @@ from scipy import sparse
 
 from crescentlab.errors import SimulationError
 from crescentlab.solvers.functions import Functions
+from crescentlab.solvers.options import TIGHT
+
+IMPLICIT = ("rodas", "radau", "lsoda")
+"""Implicit methods, the first to try first; where the tolerance is tight, rodas comes last."""
+
+
+def other_solver(solver: str, rtol: float) -> str:
+    """An implicit method other than ``solver``, fit for the tolerance."""
+    order = IMPLICIT if rtol >= TIGHT else (*IMPLICIT[1:], IMPLICIT[0])
+    return next(name for name in order if name != solver)
 
 
 class Diagnosis:
     """Names the state behind what is not finite, or behind steps that grow too short."""
 
-    def __init__(self, functions: Functions, rtol: float, atol: np.ndarray) -> None:
-        self.functions, self.rtol, self.atol = functions, rtol, atol
+    def __init__(self, functions: Functions, rtol: float, atol: np.ndarray, solver: str) -> None:
+        self.functions, self.rtol, self.atol, self.solver = functions, rtol, atol, solver
         self.system = functions.system
 
     def check_finite(self, t: float, x: np.ndarray, values: np.ndarray, when: str = "") -> None:
@@ -37,7 +47,7 @@ class Diagnosis:
             )
 
     def blame(self, t: float, x: np.ndarray) -> str:
-        """The state whose rate changes fastest against its tolerance."""
+        """The state whose rate changes fastest against its tolerance, and what may help: never the solver in use."""
         f = self.functions.rhs(t, x)
         pattern = self.functions.pattern
         matrix = sparse.csc_matrix(
@@ -47,4 +57,5 @@ class Diagnosis:
         if not np.isfinite(change).all():  # it has grown beyond all bounds: the largest state is to blame
             change = np.abs(x) / self.system.nominal
         name = self.system.state_names[int(np.argmax(change))]
-        return f"{name} limits it; try --solver bdf, a larger volume or mass there, or smoother signals"
+        other = other_solver(self.solver, self.rtol)
+        return f"{name} limits it; try --solver {other}, a larger volume or mass there, or smoother signals"

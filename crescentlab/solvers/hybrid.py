@@ -11,6 +11,7 @@ from __future__ import annotations
 import functools
 from collections import deque
 from collections.abc import Callable
+from dataclasses import dataclass
 from typing import Any, NoReturn
 
 import numpy as np
@@ -31,6 +32,22 @@ ZENO_COUNT = 60
 ZENO_SPAN = 1e-6
 SCAN_CHUNKS, SCAN_POINTS = 40, 501
 """A run is scanned for curved time roots in chunks of this many points."""
+SCAN_SWING = 0.25
+"""Between two points a relation moves by no more than this share of its range in the chunk; else it is made shorter."""
+SHORTEST_SCAN = 4.0**-6
+"""Down to this share of a chunk."""
+
+
+@dataclass(frozen=True)
+class Round:
+    """One round of events: the world before it, what fires (1 in ``flags``), and whether ticks or events do."""
+
+    x: np.ndarray
+    h: np.ndarray
+    b: np.ndarray
+    flags: np.ndarray
+    ticks: bool
+    events: bool
 
 
 class Hybrid:
@@ -69,6 +86,9 @@ class Hybrid:
         self.curved = np.flatnonzero(system.bits.on_time & ~system.bits.linear)
         self.linear = np.flatnonzero(system.bits.linear)
         self.curved_roots: list[float] = []
+        self.following = [(f.places, f.schedule(start, stop)) for f in values.following]
+        self.chunk = self.span / SCAN_CHUNKS
+        """Length of time that is scanned at once."""
         self.scanned: float | None = None
         """Until when curved relations on time have been scanned; None: not yet."""
 
@@ -108,8 +128,16 @@ class Hybrid:
         clocks = {"origin": self.origin, "ticked": self.ticked, "period": self.periods}
         return {"h": self.h, "b": self.b, "holds": self.holds, **clocks}
 
+    def enter(self, t: float, x: np.ndarray) -> tuple[np.ndarray, list[str]]:
+        """The start of a run, the same for every solver: the bits begin, then what is true fires.
+
+        Returns the state after it and the names of what fired.
+        """
+        self.begin(t, x)
+        return self.stop(t, x, [], starts=not self.resumed)
+
     def begin(self, t: float, x: np.ndarray) -> None:
-        """Bits at the start: truth first, then settling."""
+        """Bits at the start: truth first, then settling. A resumed run has its bits and conditions already."""
         if self.n and not self.resumed:
             for _ in range(2):
                 g = self.relation(t, x)[0]
@@ -134,7 +162,11 @@ class Hybrid:
         return np.where(inside & moving, rate > 0, self.truth(g)), rate
 
     def settle(self, t: float, x: np.ndarray) -> None:
-        """Bring every bit to rest; raises :class:`SimulationError` naming relations that cannot."""
+        """Bring every bit to rest; raises :class:`SimulationError` naming relations that cannot.
+
+        Before, what follows a schedule takes the row of this instant.
+        """
+        self.follow(t)
         if not self.n:
             return
         seen: dict[bytes, int] = {}
@@ -151,12 +183,23 @@ class Hybrid:
             self.rescan()
         raise SimulationError("the relations do not settle")
 
+    def follow(self, t: float) -> None:
+        """Let held values that follow a schedule take the row that holds from now on."""
+        for places, schedule in self.following:
+            row = schedule.rows[schedule.at(t, self.time_tolerance)]
+            if not np.array_equal(self.h[places], row):
+                self.h = self.h.copy()
+                self.h[places] = row
+                self.rescan()
+
     # -- stops -----------------------------------------------------------------------------------
 
-    def stop(self, t: float, x: np.ndarray, due: list[int], *, starts: bool = False) -> tuple[np.ndarray, list[str]]:
+    def stop(
+        self, t: float, x: np.ndarray, due: list[int], *, starts: bool = False, rounds: list[Round] | None = None
+    ) -> tuple[np.ndarray, list[str]]:
         """Settle and fire at time ``t``; ``due`` are positions of ticks. Returns the state after, names fired.
 
-        Where the run ``starts``, an ``initially`` waits until what it reads has been set.
+        Where the run ``starts``, an ``initially`` waits until what it reads has been set. ``rounds`` collects them.
         """
         self.settle(t, x)
         names: list[str] = []
@@ -172,7 +215,10 @@ class Hybrid:
             names += [self.system.events[k].name for k in fired]
             flags = np.zeros(len(self.system.events))
             flags[fired] = 1.0
-            new_x, new_h = self.remap(bool(ticks), len(fired) > len(ticks))(t, x, self.h, self.b, flags)
+            this = Round(x, self.h, self.b, flags, bool(ticks), len(fired) > len(ticks))
+            if rounds is not None:
+                rounds.append(this)
+            new_x, new_h = self.remap(this.ticks, this.events)(t, x, self.h, self.b, flags)
             x, held = new_x.copy(), new_h.copy()
             if not np.array_equal(held, self.h):
                 self.h = held
@@ -261,8 +307,8 @@ class Hybrid:
         return [int(k) for k in hit]
 
     def next_time_root(self, t: float, x: np.ndarray) -> float:
-        """Earliest instant after ``t`` at which a relation on time alone turns, or infinity."""
-        soonest = np.inf
+        """Earliest instant after ``t`` at which a relation on time alone turns or a schedule goes on, or infinity."""
+        soonest = min((schedule.after(t, self.time_tolerance) for _, schedule in self.following), default=np.inf)
         if self.linear.size:
             g, rate, _ = self.relation(t, x)
             for k in self.linear:
@@ -287,18 +333,25 @@ class Hybrid:
                 self.curved_roots.pop(0)
             if self.curved_roots or self.scanned >= self.end:
                 return self.curved_roots[0] if self.curved_roots else np.inf
-            until = min(self.end, self.scanned + self.span / SCAN_CHUNKS)
-            self.curved_roots = self.scan(self.scanned, until, x)
-            self.scanned = until
+            self.curved_roots, self.scanned = self.scan(self.scanned, x)
 
-    def scan(self, start: float, end: float, x: np.ndarray) -> list[float]:
-        """Roots in [start, end] of relations that curve in time, found on a fine grid and then closed in on."""
-        times = np.linspace(start, end, SCAN_POINTS)
+    def scan(self, start: float, x: np.ndarray) -> tuple[list[float], float]:
+        """The next roots of relations that curve in time, found on a grid and closed in on; until when it looked."""
         prepared = self.system.relation
-        columns = prepared.function(
-            times.reshape(1, -1), x, self.h, self.b, np.zeros(x.size), prepared.parameters(self.p)
-        )
-        g, rate = np.array(columns[0])[self.curved], np.array(columns[1])[self.curved]
+        while True:
+            end = min(self.end, start + self.chunk)
+            times = np.linspace(start, end, SCAN_POINTS)
+            columns = prepared.function(
+                times.reshape(1, -1), x, self.h, self.b, np.zeros(x.size), prepared.parameters(self.p)
+            )
+            g, rate = np.array(columns[0])[self.curved], np.array(columns[1])[self.curved]
+            swing = np.abs(rate).max(axis=1) * (times[1] - times[0])
+            if np.all(swing <= SCAN_SWING * np.ptp(g, axis=1) + EPS * np.abs(g).max(axis=1)):
+                self.chunk = min(2 * self.chunk, self.span / SCAN_CHUNKS)
+                break
+            if self.chunk <= self.span / SCAN_CHUNKS * SHORTEST_SCAN:
+                break
+            self.chunk /= 4
         found: list[float] = []
         for row, k in enumerate(self.curved):
             for j in np.flatnonzero(np.sign(g[row, 1:]) != np.sign(g[row, :-1])):
@@ -308,7 +361,7 @@ class Hybrid:
             )
             for j in np.flatnonzero(dips):
                 found += self.dip(int(k), float(times[j]), float(times[j + 1]), x)
-        return sorted(found)
+        return sorted(found), end
 
     def at(self, k: int, t: float, x: np.ndarray) -> tuple[float, float]:
         g, rate, _ = self.relation(t, x)

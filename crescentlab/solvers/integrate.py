@@ -7,15 +7,13 @@ from dataclasses import replace
 
 from crescentlab.errors import CompilerError
 from crescentlab.solvers import compiled, loop
-from crescentlab.solvers.options import Options
+from crescentlab.solvers.options import TIGHT, Options
 from crescentlab.solvers.snapshot import Snapshot
 from crescentlab.solvers.trajectory import Trajectory
 from crescentlab.system import System, Values
 
 INSTEAD = {"rodas": "auto", "dopri": "rk45"}
 """The compiled methods, and what runs on a machine that cannot build them."""
-TIGHT = 1e-7
-"""``auto`` leaves smaller tolerances to methods of higher order than that of rodas."""
 
 Progress = Callable[[float], None] | None
 

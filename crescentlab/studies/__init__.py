@@ -17,7 +17,7 @@ worker processes, on this machine or on a Dask cluster; every point becomes a ro
     conduct        Planned + store -> what is missing, run; the table
     tables, pictures (on drawing), progress
 
-    fit_file, fit_data, fit_problem   FIT.yaml and its data -> a problem; fit_scales: logarithms and bounds
+    fit_file, fit_problem             FIT.yaml and its data -> a problem; fit_scales: logarithms and bounds
     fit_model, fitting                its residuals and derivatives; the searches
     identifiability, fit_linearity    what cannot be told apart; where standard errors hold
     fit_advice, fit_report, fit_pictures

@@ -11,8 +11,8 @@ import numpy as np
 
 from crescentlab.analysis.outcome import Outcome
 from crescentlab.circuit import Circuit, load
+from crescentlab.data_files import Table, read_table
 from crescentlab.errors import InputError, Place, UnitError, nearest
-from crescentlab.studies.fit_data import Table, read_table
 from crescentlab.studies.fit_file import FitFile, ParameterSection, read_fit_file
 from crescentlab.studies.fit_scales import Data, Scale
 from crescentlab.studies.fitting import too_few
@@ -114,7 +114,9 @@ class _Reading:
         self.file, self.node, self.path = file, node, path
         self.set = {**file.set, **settings}
         self.circuit = self.load(no_code)
-        self.table = read_table(path.parent / file.data, str(path.parent / file.data), node.place_of("data"))
+        self.table = read_table(
+            path.parent / file.data, str(path.parent / file.data), node.place_of("data"), beside="fit"
+        )
 
     def load(self, no_code: bool) -> Circuit:
         beside = self.path.parent / self.file.circuit

@@ -8,17 +8,19 @@ exact laws.
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
+from crescentlab import arguments
 from crescentlab.analysis.doctor.activity import activities, indices
 from crescentlab.analysis.doctor.line_errors import LineError, line_errors
 from crescentlab.analysis.doctor.run_modes import RunModes, run_modes
 from crescentlab.analysis.linear.modes import Mode
-from crescentlab.circuit import Circuit
+from crescentlab.arguments import Number, Settings
+from crescentlab.circuit import Circuit, check_circuit
 from crescentlab.errors import InputError
 from crescentlab.result import Result
 from crescentlab.units import QUANTITIES
@@ -73,6 +75,11 @@ class Examination:
     """[J], largest first."""
     lines: tuple[LineError, ...]
 
+    def __repr__(self) -> str:
+        """Of which run."""
+        s, title = self.result.trajectory.statistics, self.result.title
+        return f"<Examination {title!r}: {self.span:g} s, {s.steps} steps, {len(self.lines)} lines>"
+
     @property
     def index(self) -> dict[str, float]:
         """Activity index, largest first."""
@@ -116,14 +123,16 @@ class Examination:
 
 
 def examine(
-    circuit: Circuit, parameters: Mapping[str, str] | None = None, *, stop: str | float | None = None,
-    rtol: float | None = None, period: str | float | None = None, line_error: float = LINE_ERROR,
+    circuit: Circuit, parameters: Settings | None = None, *, stop: str | float | None = None,
+    rtol: float | None = None, period: str | float | None = None, line_error: Number = LINE_ERROR,
     compile: bool | None = None, progress: Callable[[float], None] | None = None,
 ) -> Examination:  # fmt: skip
     """Run a circuit once and examine it; ``line_error`` is the largest error of a line that is let pass.
 
     Raises :class:`InputError` for wrong input, :class:`SimulationError` if the run fails.
     """
+    check_circuit(circuit, "doctor")
+    bound = bound_of(line_error)
     seconds = _period(circuit, parameters, period)
     result = circuit.simulate(stop, parameters, solver="rodas", rtol=rtol, compile=compile, progress=progress)
     system, statistics = result.system, result.trajectory.statistics
@@ -136,11 +145,11 @@ def examine(
     }
     return Examination(
         result, instants, _limits(system.state_names, statistics.limited, instants[-1]), _happened(result), ticking,
-        activities(result), tuple(line_errors(result, circuit.library, seconds, line_error)),
+        activities(result), tuple(line_errors(result, circuit.library, seconds, bound)),
     )  # fmt: skip
 
 
-def _period(circuit: Circuit, parameters: Mapping[str, str] | None, given: str | float | None) -> float | None:
+def _period(circuit: Circuit, parameters: Settings | None, given: str | float | None) -> float | None:
     """The circuit's period, if it has one."""
     if given is None and circuit.netlist.sections.simulation.period is None:
         return None
@@ -302,12 +311,9 @@ def _mode(mode: Mode) -> dict[str, Any]:
     }  # fmt: skip
 
 
-def bound_of(text: str) -> float:
+def bound_of(text: Number) -> float:
     """The bound of ``--line-error``: a ratio between 0 and 2."""
-    try:
-        bound = QUANTITIES["ratio"].parse(text)
-    except InputError as error:
-        raise InputError(f"--line-error: {error.message}") from None
+    bound = arguments.quantity(text, "--line-error", QUANTITIES["ratio"])
     if not 0 < bound <= 2:
         raise InputError(f"--line-error {text}: an error lies between 0 and 200 %; write for example '5 %'")
     return bound

@@ -13,7 +13,7 @@ import numpy as np
 
 from crescentlab.analysis.reach import NotDifferentiableError
 from crescentlab.errors import SimulationError
-from crescentlab.solvers.hybrid import EPS, MAX_ROUNDS, Hybrid
+from crescentlab.solvers.hybrid import EPS, Hybrid, Round
 from crescentlab.solvers.snapshot import Snapshot
 from crescentlab.solvers.trajectory import Trajectory
 from crescentlab.system import System, Values
@@ -33,16 +33,6 @@ class World:
     x: Array
     h: Array
     b: Array
-
-
-@dataclass(frozen=True)
-class Round:
-    """Events that fire together: the world they read, their flags (events,), whether ticks or others are among them."""
-
-    before: World
-    flags: Array
-    ticks: bool
-    events: bool
 
 
 @dataclass(frozen=True)
@@ -108,7 +98,7 @@ class _Replay:
         hybrid, t, x = self.hybrid, float(self.rows.t[0]), self.values.x0
         hybrid.begin(t, x)
         before = World(x, hybrid.h, hybrid.b)
-        rounds, after, names = self.rounds(t, before, [])
+        rounds, after, names = self.rounds(t, before, [], starts=not hybrid.resumed)
         self.compare(t, after, 0)
         return Stop(t, before, after, (), (), rounds, names)
 
@@ -168,24 +158,13 @@ class _Replay:
         found = tuple(k for k in turned if switches[k] or matters(k))
         return found or tuple(turned)
 
-    def rounds(self, t: float, before: World, due: list[int]) -> tuple[tuple[Round, ...], World, tuple[str, ...]]:
+    def rounds(
+        self, t: float, before: World, due: list[int], *, starts: bool = False
+    ) -> tuple[tuple[Round, ...], World, tuple[str, ...]]:
         """Fire in rounds, bits having settled; the rounds, the world after them, the events' names."""
-        hybrid, events = self.hybrid, self.system.events
-        x, found, names = before.x, [], []
-        for _ in range(MAX_ROUNDS):
-            ticks = [hybrid.ticking[k] for k in due]
-            fired = hybrid.edges(t, x) + ticks
-            due = []
-            if not fired:
-                break
-            flags = np.zeros(len(events))
-            flags[fired] = 1.0
-            found.append(Round(World(x, hybrid.h, hybrid.b), flags, bool(ticks), len(fired) > len(ticks)))
-            names += [events[k].name for k in fired]
-            new_x, new_h = hybrid.remap(bool(ticks), len(fired) > len(ticks))(t, x, hybrid.h, hybrid.b, flags)
-            x, hybrid.h = new_x.copy(), new_h.copy()
-            hybrid.settle(t, x)
-        return tuple(found), World(x, hybrid.h, hybrid.b), tuple(names)
+        hybrid, rounds = self.hybrid, list[Round]()
+        x, names = hybrid.stop(t, before.x, due, starts=starts, rounds=rounds)
+        return tuple(rounds), World(x, hybrid.h, hybrid.b), tuple(names)
 
     def compare(self, t: float, world: World, row: int) -> None:
         """Raise unless the world is that of the row."""

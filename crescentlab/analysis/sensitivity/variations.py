@@ -7,8 +7,9 @@ from collections.abc import Callable
 import casadi as ca
 import numpy as np
 
-from crescentlab.analysis.sensitivity.replay import Round, World
+from crescentlab.analysis.sensitivity.replay import World
 from crescentlab.prepared import Evaluator, Prepared, jacobian, prepare
+from crescentlab.solvers.hybrid import Round
 from crescentlab.symbols import column
 from crescentlab.system import System, Values
 
@@ -87,8 +88,7 @@ class Variations:
         """How what a round sets changes along (dt (m,), dx (n, m), dh (k, m), dp)."""
         kind = "all" if each.ticks and each.events else "ticks" if each.ticks else "events"
         function = self.function(f"remap along {kind}", lambda system: _remap_along(system, kind))
-        world = each.before
-        x, h = function(t, world.x, world.h, world.b, each.flags, self.p, dt.reshape(1, -1), dx, dh, self.dp)
+        x, h = function(t, each.x, each.h, each.b, each.flags, self.p, dt.reshape(1, -1), dx, dh, self.dp)
         return x.full(), h.full()
 
     def tick(self, position: int, count: int) -> Array:

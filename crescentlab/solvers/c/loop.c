@@ -115,6 +115,27 @@ static void now_switched(Run *r)
     if (r->curved_held) r->rescan = 1;
 }
 
+/* Count how closely the turns of an event or, behind the events, of a relation follow one another. */
+static void turned(Run *r, int64_t k)
+{
+    const int close = r->steps - r->storm_last[k] < r->storm_steps;
+    r->storm_last[k] = r->steps;
+    if (r->storm_row[k] < r->storm_count) r->storm_row[k] = close ? r->storm_row[k] + 1 : 0;
+}
+
+/* Let held values that follow a schedule take the row that holds from now on. */
+static void follow(Run *r)
+{
+    for (int64_t k = 0; k < r->n_schedules; k++) {
+        int64_t at = r->schedule_at[k];
+        while (at < r->schedule_last[k] && r->schedule_times[at + 1] <= r->t + r->tolerance) at++;
+        if (at == r->schedule_at[k]) continue;
+        r->schedule_at[k] = at;
+        memcpy(r->h + r->schedule_place[k], r->schedule_rows + at * r->schedule_width, r->schedule_size[k] * sizeof *r->h);
+        now_switched(r);
+    }
+}
+
 /* Bring every bit to rest. A relation's tolerance is that of its fastest rate met on the way: a rate that depends on the
  * bit itself would else put it inside its tolerance with one value and outside with the other. */
 static int settle(Run *r, int onward)
@@ -135,6 +156,8 @@ static int settle(Run *r, int onward)
                 r->culprit = other;
                 return UNSETTLED;
             }
+        for (int64_t k = 0; k < r->n_bits; k++)
+            if (r->want[k] != r->b[k]) turned(r, r->n_events + k);
         memcpy(r->b, r->want, r->n_bits * sizeof *r->b);
         now_switched(r);
     }
@@ -158,6 +181,7 @@ static void log_event(Run *r, int64_t event)
 {
     r->log_t[r->logs] = r->t;
     r->log_event[r->logs++] = event;
+    turned(r, event);
     if (r->kind[event] == EVERY)
         r->ticks++;
     else
@@ -260,6 +284,8 @@ void find_goal(Run *r)
 {
     double goal = r->stop;
     for (int64_t k = 0; k < r->n_ticks; k++) goal = fmin(goal, r->origin[k] + (r->ticked[k] + 1) * r->period[k]);
+    for (int64_t k = 0; k < r->n_schedules; k++)
+        if (r->schedule_at[k] < r->schedule_last[k]) goal = fmin(goal, r->schedule_times[r->schedule_at[k] + 1]);
     for (int64_t j = 0; j < r->n_linear; j++) {
         const int64_t k = r->time_linear[j];
         const double ahead = -r->g[k] / r->g_rate[k];
@@ -292,7 +318,6 @@ static int held_possible(Run *r)
 /* Whether f after a stop differs from f before it by more than may pass unseen. */
 static int f_changed(const Run *r, const double *old)
 {
-    if (!r->rate_exact) return 1;
     for (int64_t i = 0; i < r->n; i++)
         if (fabs(r->fx[i] - old[i]) * r->step > r->restart_share * (r->atol[i] + r->rtol * fabs(r->x[i]))) return 1;
     return 0;
@@ -301,14 +326,15 @@ static int f_changed(const Run *r, const double *old)
 /* Everything that happens at t: settle, fire, look ahead. */
 static int stop_here(Run *r, int start, int landed)
 {
-    const int64_t events = r->events, ticks = r->ticks;
-    const int only_ticks = !start && !landed && !r->n_linear && !r->curved;
+    const int64_t ticks = r->ticks;
+    const int only_ticks = !start && !landed && !r->n_linear && !r->n_schedules && !r->curved;
     for (int64_t k = 0; k < r->n_ticks; k++)
         if (r->origin[k] + (r->ticked[k] + 1) * r->period[k] <= r->t + r->tolerance) r->due[k] = 1, r->ticked[k]++;
     if (r->curved && r->curved_next <= r->t + r->tolerance) r->rescan = 1;
     r->jumped = 0;
     r->last_event = -1;
     if (start) r->switched = 1; /* the first world is that after the start */
+    follow(r);
     int code = fire(r, only_ticks);
     if (!code && only_ticks && r->ticks == ticks) rhs(r, r->t, r->x); /* the end of the run */
     const int changed = r->jumped || r->switched;
@@ -317,7 +343,7 @@ static int stop_here(Run *r, int start, int landed)
     for (int64_t i = 0; i < r->n; i++)
         if (!isfinite(r->fx[i])) return NOT_FINITE;
     if (!held_possible(r)) return IMPOSSIBLE_HELD;
-    if (!start && changed && (r->jumped || (r->events > events && f_changed(r, r->rate)))) {
+    if (!start && changed && !r->finished && r->t < r->stop && (r->jumped || f_changed(r, r->rate))) {
         r->restarts++;
         if (r->last_event >= 0 && r->first_step[r->last_event] > 0)
             r->step = r->first_step[r->last_event];
@@ -616,21 +642,15 @@ static int step(Run *r)
     if (!possible(r)) return IMPOSSIBLE;
     r->tiny = h < SMALLEST * (r->stop - r->start) ? r->tiny + 1 : 0;
     if (r->tiny > COLLAPSE_COUNT) return COLLAPSED;
-    if (event != 0 && !r->rate_exact) memcpy(r->rate, rhs(r, r->t, r->x), r->n * sizeof *r->rate), r->rate_exact = 1;
-    return event != 0 || r->t >= r->goal - r->tolerance ? stop_here(r, 0, event != 0) : PAUSED;
+    if (event == 0 && r->t < r->goal - r->tolerance) return PAUSED;
+    if (!r->rate_exact) memcpy(r->rate, rhs(r, r->t, r->x), r->n * sizeof *r->rate); /* what f is before the stop */
+    return stop_here(r, 0, event != 0);
 }
 
+/* The start has been computed: states, held values, bits and conditions are those after it. */
 static int begin(Run *r)
 {
     r->begun = 1;
-    r->t = r->start;
-    read_relations(r, 0);
-    for (int64_t i = 0; i < r->n; i++)
-        if (!isfinite(r->fx[i])) return NOT_FINITE;
-    for (int twice = 0; twice < 2 && !r->resumed; twice++) {
-        for (int64_t k = 0; k < r->n_bits; k++) r->b[k] = r->g[k] > 0 || (r->g[k] == 0 && !r->strict[k]);
-        read_relations(r, 0);
-    }
     const int code = stop_here(r, 1, 0);
     r->step = first_step(r);
     return code;

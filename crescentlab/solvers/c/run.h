@@ -23,6 +23,7 @@ typedef struct Run {
     int64_t n_linear; /* relations linear in time */
     int64_t n_angles; /* states that are angles */
     int64_t n_pace; /* points of the pace, 0 without one */
+    int64_t n_schedules; /* held vectors that follow a schedule */
 
     /* functions of the system, and how to call one: trigger(function) */
     void *trigger; /* void (*)(void *) */
@@ -73,6 +74,13 @@ typedef struct Run {
     int64_t *ticked; /* (n_ticks) */
     int64_t *due; /* (n_ticks) */
     int64_t *angles; /* (n_angles) states */
+    double *schedule_times; /* (rows of all schedules) from when on each row holds */
+    double *schedule_rows; /* (rows of all schedules, schedule_width) */
+    int64_t schedule_width; /* of the widest */
+    int64_t *schedule_at; /* (n_schedules) present row */
+    int64_t *schedule_last; /* (n_schedules) last row */
+    int64_t *schedule_place; /* (n_schedules) first place among the held values */
+    int64_t *schedule_size; /* (n_schedules) number of places */
     int64_t curved; /* relations that curve in time: Python finds their roots */
     int64_t curved_held; /* whether those depend on held values or bits */
     double curved_next; /* the next of their roots */
@@ -95,7 +103,6 @@ typedef struct Run {
 
     /* where it stands */
     int64_t begun;
-    int64_t resumed; /* where another run ended: bits and conditions are known */
     int64_t finished; /* by an event of kind STOP */
     int64_t rescan; /* roots of curved relations may have changed */
     int64_t culprit; /* relation, event, state that a failure names */
@@ -115,6 +122,10 @@ typedef struct Run {
     int64_t switched; /* whether it changed held values or bits */
     double *recent; /* (n_events, ZENO_COUNT) last times of each event */
     int64_t *fired; /* (n_events) how often it fired */
+    int64_t *storm_last; /* (n_events + n_bits) steps when each last turned */
+    int64_t *storm_row; /* (n_events + n_bits) turns in a row with fewer than storm_steps between */
+    int64_t storm_steps;
+    int64_t storm_count; /* so many are a storm, and stay one */
     double zeno_span; /* this many firings within this time are endless */
 
     /* scratch of the loop */
