@@ -201,14 +201,15 @@ class FourThreeValve(Metering, Lapped, Component):
 
     def equations(self, p_supply: Expr, p_a: Expr, p_b: Expr, p_tank: Expr, stroke: Expr, fluid: Fluid) -> Equations:
         tank_overlap = self.overlap if self.tank_overlap is None else self.tank_overlap
+        area_b = self.area_ratio * self.area
 
         def returned(x: Any) -> Any:
             return edge_share(x, tank_overlap, self.edge_rounding)
 
         p_to_a = self.metered(p_supply, p_a, self.opened(stroke), fluid)
-        p_to_b = self.metered(p_supply, p_b, self.area_ratio * self.opened(-stroke), fluid)
+        p_to_b = self.through(p_supply, p_b, area_b * self.opened(-stroke), fluid)
         a_to_t = self.metered(p_a, p_tank, returned(-stroke), fluid)
-        b_to_t = self.metered(p_b, p_tank, self.area_ratio * returned(stroke), fluid)
+        b_to_t = self.through(p_b, p_tank, area_b * returned(stroke), fluid)
         middle = self.tandem_area * middle_share(stroke, self.tandem_stroke, self.edge_rounding)
         p_to_t = self.through(p_supply, p_tank, middle, fluid)
         return {
