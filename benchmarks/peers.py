@@ -71,10 +71,10 @@ class Chain:
     """n volumes of 70 cm^3, an orifice of 2 mm^2 after each, a tank at the end, a pulsating source at the first.
 
     .. math:: \\dot p_i = \\frac{\\beta}{V} e^{-p_i/\\beta} (q_{i-1} - q_i), \\quad
-              q = C_d A \\sqrt{2|\\Delta p|/\\rho}\\,\\mathrm{sign}\\,\\Delta p
+              q = C_d A \\sqrt{2\\rho|\\Delta p|}/\\rho_0\\,\\mathrm{sign}\\,\\Delta p
 
-    States p in bar, gauge. The orifice law is ``orifice``'s, evaluated as K u T(k^2 |u|) with u = 2 dp/rho and
-    T(s) = tanh(sqrt s)/sqrt s, for which dq/du = K (T + 1/cosh^2 sqrt s)/2.
+    States p in bar, gauge. The orifice law is ``orifice``'s, evaluated as K (2 dp/rho_0) T(k^2 |u|) with u = 2 dp/rho
+    and T(s) = tanh(sqrt s)/sqrt s, for which d(u T)/du = D = (T + 1/cosh^2 sqrt s)/2.
     """
 
     volume, area, rho_0, nu, beta = 70e-6, 2e-6, 860.0, 35e-6, 1.4e9
@@ -132,7 +132,7 @@ class Chain:
         r = np.sqrt(np.maximum(s, 1e-3))
         low = np.minimum(s, 1e-3)
         T = np.where(s < 1e-3, 1 - low / 3 + 2 * low**2 / 15 - 17 * low**3 / 315, np.tanh(r) / r)
-        return self.K * u * T, T, s, drop, rho
+        return self.K * 2 * drop / self.rho_0 * T, T, s, drop
 
     def rates(self, t: float, x: np.ndarray) -> np.ndarray:
         """dx/dt [bar/s]."""
@@ -144,9 +144,10 @@ class Chain:
     def diagonals(self, t: float, x: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Below, on and above the diagonal of the Jacobian [1/s]."""
         p = x * 1e5
-        q, T, s, drop, rho = self.orifices(p)
-        slope = self.K * (T + 1 / np.cosh(np.minimum(np.sqrt(s), 300.0)) ** 2) / 2
-        q_a, q_b = slope * (2 - drop / self.beta) / rho, slope * (-2 - drop / self.beta) / rho
+        q, T, s, drop = self.orifices(p)
+        D = (T + 1 / np.cosh(np.minimum(np.sqrt(s), 300.0)) ** 2) / 2
+        thinner = (D - T) * drop / self.beta
+        q_a, q_b = self.K * (2 * D - thinner) / self.rho_0, -self.K * (2 * D + thinner) / self.rho_0
         inflow = np.concatenate(([self.source(t)], q[:-1]))
         factor = self.beta / self.volume * np.exp(-p / self.beta)
         before = np.concatenate(([0.0], q_b[:-1]))
@@ -258,9 +259,9 @@ class Valve:
         else:
             r = math.sqrt(s)
             T = math.tanh(r) / r
-        q = self.number * area * self.cd_max * k * 2 * p / rho * T
+        q = self.number * area * self.cd_max * k * 2 * p / self.rho_0 * T
         rounded = math.hypot(p, self.drop_rounding)
-        return q, self.jet * rho * q * p / rounded * math.sqrt(2 * rounded / rho)
+        return q, self.jet * self.rho_0 * q * p / rounded * math.sqrt(2 * rounded / rho)
 
     def lift(self, p: float, x: float, v: float, q: float, jet: float) -> float:
         """Force [N] on the spool."""
@@ -469,10 +470,10 @@ def chain_diagram(chain: Chain, rtol: float, solver: str) -> Run:
 
     def orifice(a: float, b: float) -> float:
         a, b = float(a) * 1e5, float(b) * 1e5
-        u = 2 * (a - b) / (chain.rho_0 * math.exp((a + b) / (2 * chain.beta)))
-        s = chain.k**2 * abs(u)
+        w = 2 * (a - b) / chain.rho_0
+        s = chain.k**2 * abs(w) / math.exp((a + b) / (2 * chain.beta))
         r = math.sqrt(s)
-        return chain.K * u * (math.tanh(r) / r if s > 1e-3 else 1 - s / 3 + 2 * s**2 / 15 - 17 * s**3 / 315)
+        return chain.K * w * (math.tanh(r) / r if s > 1e-3 else 1 - s / 3 + 2 * s**2 / 15 - 17 * s**3 / 315)
 
     n = chain.n
     volumes, orifices = [ODE(volume, np.zeros(1)) for _ in range(n)], [Function(orifice) for _ in range(n)]

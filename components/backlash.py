@@ -15,16 +15,16 @@ class Backlash(Component):
 
     .. math:: \frac{d\vartheta}{dt} = \omega_a - \omega_b, \quad
               T = c \delta (1 + \alpha \dot\delta) \text{ for } \delta = |\vartheta| - \frac{\beta}{2} > 0, \quad
-              \alpha = \frac{3}{2} \frac{1 - e}{\omega_i}
+              \alpha \omega_i - \ln(1 + \alpha \omega_i) = -e \alpha \omega_i - \ln(1 - e \alpha \omega_i)
 
     \vartheta [rad] angle of a less angle of b from the middle of the play, a state of its own, so that the rotors'
     angles may be counted on for ever; \beta = `play` [rad] from flank to flank; T [N m] on b towards its flank, the
     reaction on a, never pulling; c = `stiffness` [N m/rad]; e = `restitution` [-] at \omega_i = `impact_speed` [rad/s],
-    to first order in 1 - e and nearer to 1 in slower impacts. Touching and parting are events. It starts in the middle
-    unless `start: {twist: ...}` says otherwise. Energy: c \delta^2/2 [J]; c \delta \alpha \dot\delta^2 [W] is lost,
-    and all that is stored where flanks part faster than they expand. Not for the lag of a signal behind play, nor for
-    friction that holds within it (`rotary_friction`). Source: K. H. Hunt, F. R. E. Crossley, J. Appl. Mech. 42 (1975)
-    440-445, with the exponent 1, on both flanks.
+    below 0.01 counted as 0.01, and nearer to 1 in slower impacts. Touching and parting are events. It starts in the
+    middle unless `start: {twist: ...}` says otherwise. Energy: c \delta^2/2 [J]; c \delta \alpha \dot\delta^2 [W] is
+    lost, and all that is stored where flanks part faster than they expand. Not for the lag of a signal behind play, nor
+    for friction that holds within it (`rotary_friction`). Source: K. H. Hunt, F. R. E. Crossley, J. Appl. Mech. 42
+    (1975) 440-445, with the exponent 1, on both flanks.
     """
 
     play: Angle = Field(ge=0, description="angle that a turns against b from flank to flank")

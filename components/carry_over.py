@@ -34,21 +34,24 @@ class CarryOverChain(Component):
     r"""Carry-over volumes between suction and delivery, separated by tooth tips at the crescent.
 
     .. math:: \frac{dp_j}{dt} = \frac{\beta}{V} \frac{\rho_0}{\rho} (q_{j+1} - q_j + q_{chain,j}), \quad
-              q_j = \frac{H h^3 (p_j - p_{j-1})}{12 \mu l} - \frac{h H R \tau \omega}{2}
+              q_j = \frac{\rho_j}{\rho_0} \left(\frac{H h^3 (p_j - p_{j-1})}{12 \mu l}
+              - \frac{h H R \tau \omega}{2}\right)
 
     p_j [Pa, gauge] pressure of volume j = 1 ... N from the suction side, p_0 the suction's, p_{N+1} the delivery's;
     V [m^3] each volume; q_j [m^3/s] flow through tip gap j = 1 ... N+1, positive towards suction, the drag of the tip
     always towards delivery; H [m] thickness, h [m] gap height, l [m] gap length, R [m] tip radius; tau [-] speed of
-    the gear over that of the shaft, omega [rad/s] the shaft's speed; \mu [Pa s] at the gap's mean pressure;
+    the gear over that of the shaft, omega [rad/s] the shaft's speed; \mu [Pa s], \rho_j at the gap's mean pressure;
     q_chain [m^3/s] into volume j from what is attached to it. Once per `pitch` of the signal `phase` a new volume
-    closes at the suction side with the suction's pressure and the others move up one place. The last volume opens to
-    delivery `extension` after it closed: then tip gap N+1 is gone, the volume takes the delivery's pressure, and what
-    flows into it passes on to delivery. N is the whole part of extension/pitch. With N = 0 a single gap lies between
-    delivery and suction at all times: an `extension` below one pitch seals for a part of each pitch only, and the
-    short circuit of the rest is not modelled, so there the leakage is too small.
+    closes at the suction side with the suction's pressure and the others move up one place. A volume
+    closes as the tip behind it comes to the crescent, one pitch after the tip before it did, and opens to delivery as
+    that one leaves: `extension` less one pitch after it closed. Then tip gap N+1 is gone, the volume takes the
+    delivery's pressure, and what flows into it passes on to delivery. N is the whole part of extension/pitch: N volumes
+    are carried for the first extension - N pitch of each pitch, N - 1 for the rest of it. With N = 0 a single gap lies
+    between delivery and suction at all times: an `extension` below one pitch seals for a part of each pitch only, and
+    the short circuit of the rest is not modelled, so there the leakage is too small.
 
     Stored: the sum of V \rho/\rho_0 [m^3] over the volumes that exist, energy V e(p) [J]. The tips' drag supplies
-    \rho_0 [w(p_j) - w(p_{j-1})] h H R \tau \omega/2 [W] per gap, the pressure's share of the work of moving them, which
+    \rho_j [w(p_j) - w(p_{j-1})] h H R \tau \omega/2 [W] per gap, the pressure's share of the work of moving them, which
     is not asked of the shaft; the flow of pressure through the gaps is lost.
 
     Not for a reversed shaft, nor for a volume that changes while it is carried. Mixing with the delivery when a volume
@@ -97,7 +100,8 @@ class CarryOverChain(Component):
         p_now = exists * p + (1 - exists) * p_delivery
         along = stack(p_suction, p_now, p_delivery)
         leak = slot_flow(along[1:], along[:-1], self.thickness, self.gap_height, self.gap_length, fluid)
-        drag = drag_flow(self.tip_radius * self.speed_ratio * omega_shaft, self.thickness, self.gap_height)
+        tip_speed = self.tip_radius * self.speed_ratio * omega_shaft
+        drag = drag_flow(along[1:], along[:-1], tip_speed, self.thickness, self.gap_height, fluid)
         gaps = stack(ones(N), sealed)
         q = gaps * (leak - drag)
         rise = fluid.rho_0 * gaps * (fluid.enthalpy(along[1:]) - fluid.enthalpy(along[:-1]))
@@ -127,7 +131,7 @@ class CarryOverChain(Component):
         contacts = self.extension / self.pitch
         if not self.volumes - ROUNDING <= contacts <= self.volumes + 1 + ROUNDING:
             raise ValueError(
-                f"volumes is {self.volumes}, but extension/pitch is {contacts:.4g}; "
-                f"write volumes: {int(contacts)}, or change extension or pitch"
+                f"volumes is {self.volumes}, but extension/pitch is {contacts:.4g}: a volume opens extension less one "
+                f"pitch after it closed; write volumes: {int(contacts)}, or change extension or pitch"
             )
         return self

@@ -126,6 +126,11 @@ class CrescentGears(Component):
         }  # fmt: skip
 
     @property
+    def unbalanced(self) -> str:
+        """Mean volumes stay as they are while what is displaced flows."""
+        return "volumes: mean keeps its volumes as they are while they displace fluid" if self.volumes == "mean" else ""
+
+    @property
     def chambers(self) -> Chambers:
         """The volumes over a pitch, and through ``chambers.mesh`` the contact geometry."""
         half_1, half_2 = self.module * self.driver_teeth / 2, self.module * self.driven_teeth / 2

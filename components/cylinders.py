@@ -32,7 +32,7 @@ from crescentlab.units import (
     Volume,
 )
 
-from .flow_laws import orifice_flow
+from .flow_laws import orifice_flow, referred_flow
 from .mechanics import contact_force
 
 SMALLEST_SHARE = 1e-3
@@ -120,18 +120,18 @@ class DoubleActingCylinder(Component):
     .. math:: \frac{dp_1}{dt} = \frac{\beta_1}{V_1} \left(\frac{\rho_0}{\rho_1} (q_1 - q_l) - A_1 v\right), \quad
               \frac{dp_2}{dt} = \frac{\beta_2}{V_2} \left(\frac{\rho_0}{\rho_2} (q_2 + q_l) + A_2 v\right)
 
-    .. math:: V_1 = V_{01} + A_1 x, \quad V_2 = V_{02} + A_2 (s - x), \quad q_l = G (p_1 - p_2), \quad
-              F = p_1 A_1 - p_2 A_2 - B v + F_{stop}
+    .. math:: V_1 = V_{01} + A_1 x, \quad V_2 = V_{02} + A_2 (s - x), \quad
+              q_l = \frac{\rho_m}{\rho_0} G (p_1 - p_2), \quad F = p_1 A_1 - p_2 A_2 - B v + F_{stop}
 
     1 is the cap's side, 2 the rod's; p [Pa, gauge]; q [m^3/s] into the chambers; x [m] of the rod from 0 to s =
     `stroke`, v [m/s]; F [N] on the rod's mass, towards increasing x; A = \pi (d^2 - d_r^2)/4 [m^2] with d =
     `piston_diameter`, d_r = `rod_diameter` on side 2, `cap_rod_diameter` on side 1 (a rod through both ends); V_0 dead
     volumes [m^3]; G = `leakage_conductance` [m^3/(s Pa)]; B = `viscous_friction` [N s/m]; the stops are those of
-    `elastic_end_stops`; \beta [Pa], \rho [kg/m^3] of each chamber. Stored: the sum of V \rho/\rho_0 [m^3]; energy V_1
-    e(p_1) + V_2 e(p_2) [J] and the strain of the stops. Lost: B v^2, the leakage's \rho_0 q_l (w(p_1) - w(p_2)) [W] and
-    the stops' damping. Join the rod to a mass, dry friction beside it (`friction_between`, `stick_slip_mass`), and
-    cushions between chamber and pipe (`cushion`). Not for a housing that moves. Source: H. E. Merritt, Hydraulic
-    Control Systems (1967), chapter 6, valve controlled piston.
+    `elastic_end_stops`; \beta [Pa], \rho [kg/m^3] of each chamber, \rho_m at the mean of both pressures. Stored: the
+    sum of V \rho/\rho_0 [m^3]; energy V_1 e(p_1) + V_2 e(p_2) [J] and the strain of the stops. Lost: B v^2, the
+    leakage's \rho_0 q_l (w(p_1) - w(p_2)) [W] and the stops' damping. Join the rod to a mass, dry friction beside it
+    (`friction_between`, `stick_slip_mass`), and cushions between chamber and pipe (`cushion`). Not for a housing that
+    moves. Source: H. E. Merritt, Hydraulic Control Systems (1967), chapter 6, valve controlled piston.
     """
 
     piston_diameter: Length = Field(gt=0, description="diameter of the piston")
@@ -183,7 +183,7 @@ class DoubleActingCylinder(Component):
         law = (self.stop_stiffness, self.restitution, self.impact_velocity)
         stop, strain, stop_loss = _stops(x_rod, v_rod, self.stroke, *law)
         force = p_1 * area_1 - p_2 * area_2 - self.viscous_friction * v_rod + stop
-        leakage = self.leakage_conductance * (p_1 - p_2)
+        leakage = referred_flow(self.leakage_conductance * (p_1 - p_2), (p_1 + p_2) / 2, fluid)
         throttled = fluid.rho_0 * leakage * (fluid.enthalpy(p_1) - fluid.enthalpy(p_2))
         used = (left_1 < SMALLEST_SHARE * self.cap_dead_volume) | (left_2 < SMALLEST_SHARE * self.rod_dead_volume)
         return {
@@ -210,7 +210,7 @@ class DoubleActingCylinder(Component):
 class Cushion(Component):
     r"""Cushion of a cylinder: the way out of a chamber narrows as the piston nears the end of its stroke.
 
-    .. math:: q = C_d A(z) \sqrt{2 |\Delta p|/\rho}\; \mathrm{sign}\,\Delta p, \quad
+    .. math:: q = C_d A(z) \sqrt{2\rho|\Delta p|}/\rho_0\; \mathrm{sign}\,\Delta p, \quad
               A = A_r + (A_0 - A_r) z \ \text{(linear)} \quad \text{or} \quad
               A = \sqrt{A_r^2 + (A_0^2 - A_r^2) z} \ \text{(constant\_deceleration)}
 

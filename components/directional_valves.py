@@ -13,7 +13,7 @@ from crescentlab.fluid import Fluid
 from crescentlab.maths import Expr, pi
 from crescentlab.units import Area, Flow, Frequency, Ratio
 
-from .valve_laws import Metering, clipped, edge_share, follower, middle_share
+from .valve_laws import Metering, edge_share, follower, middle_share
 
 
 class Lapped(BaseModel):
@@ -44,7 +44,7 @@ class SpoolDrive(Component):
     natural_frequency: Frequency = Field(gt=0, description="undamped natural frequency of the spool")
     damping_ratio: Ratio = Field(default=0.7, ge=0, description="damping over critical damping")
 
-    command = takes_signal(Ratio, "stroke asked for, -1 to 1")
+    command = takes_signal(Ratio, "stroke asked for", low=-1, high=1)
     stroke = gives_signal(Ratio, "stroke of the spool, -1 to 1")
     position = state(Ratio, "stroke of the spool", start=0.0, nominal=1.0)
     rate = state(Frequency, "strokes per time", start=0.0, nominal=100.0)
@@ -52,21 +52,21 @@ class SpoolDrive(Component):
 
     def equations(self, position: Expr, rate: Expr, at: Expr, command: Expr) -> Equations:
         omega = 2 * pi * self.natural_frequency
-        moves = follower(position, rate, at, clipped(command, -1.0), omega, self.damping_ratio, low=-1.0)
+        moves = follower(position, rate, at, command, omega, self.damping_ratio, low=-1.0)
         return {"stroke": position, **moves}
 
 
 class TwoTwoValve(Metering, Component):
     r"""2/2 directional valve, proportional or switching.
 
-    .. math:: q = C_d s A \sqrt{2|\Delta p|/\rho}\, \mathrm{sign}\,\Delta p, \quad s = \frac{x - u}{1 - u}, \quad
+    .. math:: q = C_d s A \sqrt{2\rho|\Delta p|}/\rho_0\, \mathrm{sign}\,\Delta p, \quad s = \frac{x - u}{1 - u}, \quad
               C_d = C_{d,max} \tanh(2\lambda/\lambda_c)
 
     \Delta p = p_a - p_b [Pa]; x = `stroke` [-], counted within 0 and 1; u = `overlap` [-]; s [-] is 0 below u, and the
     corner there is rounded within w = `edge_rounding` [-] on either side: at x = u it is open by w/4, at x = u - w
     shut; by default u = w, so that stroke 0 passes nothing; A = `area` [m^2]; \lambda = (d_h/\nu)
-    \sqrt{2|\Delta p|/\rho} [-], d_h [m] of a round hole; \rho [kg/m^3], \nu [m^2/s] at the mean pressure. Not for
-    leakage when closed, nor for cavitating flow.
+    \sqrt{2|\Delta p|/\rho} [-], d_h [m] of a round hole; \rho [kg/m^3], \nu [m^2/s] at the mean pressure, \rho_0 at 0
+    bar gauge. Not for leakage when closed, nor for cavitating flow.
     Source: H. E. Merritt, Hydraulic Control Systems (1967), chapter 5; Rundo & Corvaglia (2016), Eqs. 27-29.
     """
 
@@ -77,7 +77,7 @@ class TwoTwoValve(Metering, Component):
 
     a = takes_pressure("inlet")
     b = takes_pressure("outlet")
-    stroke = takes_signal(Ratio, "0 is closed, 1 is open")
+    stroke = takes_signal(Ratio, "0 is closed, 1 is open", low=0, high=1)
     q = observable(Flow, "flow from a to b")
     loss = dissipates()
 
@@ -90,8 +90,8 @@ class TwoTwoValve(Metering, Component):
 class ThreeTwoValve(Metering, Lapped, Component):
     r"""3/2 directional valve: joins its work port to the tank at stroke 0, to the supply at stroke 1.
 
-    .. math:: q_{sw} = C_d\, s(y) A \sqrt{2|p_s - p_w|/\rho}\, \mathrm{sign}(p_s - p_w), \quad
-              q_{wt} = C_d\, s(-y) A \sqrt{2|p_w - p_t|/\rho}\, \mathrm{sign}(p_w - p_t), \quad y = 2 x - 1
+    .. math:: q_{sw} = C_d\, s(y) A \sqrt{2\rho|p_s - p_w|}/\rho_0\, \mathrm{sign}(p_s - p_w), \quad
+              q_{wt} = C_d\, s(-y) A \sqrt{2\rho|p_w - p_t|}/\rho_0\, \mathrm{sign}(p_w - p_t), \quad y = 2 x - 1
 
     p [Pa] of supply, work port, tank; x = `stroke` [-], counted within 0 and 1; s(y) [-], A = `area` [m^2], C_d [-],
     \rho [kg/m^3] as in `two_two_valve`, u = `overlap` [-] being 0 by default. At either end of the stroke the edge that
@@ -104,7 +104,7 @@ class ThreeTwoValve(Metering, Lapped, Component):
     supply = takes_pressure("supply port P")
     work = takes_pressure("work port A")
     tank = takes_pressure("tank port T")
-    stroke = takes_signal(Ratio, "0 joins work port and tank, 1 supply and work port")
+    stroke = takes_signal(Ratio, "0 joins work port and tank, 1 supply and work port", low=0, high=1)
     q_in = observable(Flow, "flow from supply to work port")
     q_out = observable(Flow, "flow from work port to tank")
     loss = dissipates()
@@ -119,7 +119,7 @@ class ThreeTwoValve(Metering, Lapped, Component):
 class FourTwoValve(Metering, Lapped, Component):
     r"""4/2 directional valve: joins P to B and A to T at stroke 0, P to A and B to T at stroke 1.
 
-    .. math:: q_{jk} = C_d\, s_{jk} A \sqrt{2|p_j - p_k|/\rho}\, \mathrm{sign}(p_j - p_k), \quad
+    .. math:: q_{jk} = C_d\, s_{jk} A \sqrt{2\rho|p_j - p_k|}/\rho_0\, \mathrm{sign}(p_j - p_k), \quad
               s_{PA} = s_{BT} = s(y), \quad s_{PB} = s_{AT} = s(-y), \quad y = 2 x - 1
 
     p [Pa] of supply P, work ports A and B, tank T; x = `stroke` [-], counted within 0 and 1; s(y) [-], A = `area` of
@@ -135,7 +135,7 @@ class FourTwoValve(Metering, Lapped, Component):
     a = takes_pressure("work port A")
     b = takes_pressure("work port B")
     tank = takes_pressure("tank port T")
-    stroke = takes_signal(Ratio, "0 joins P with B and A with T, 1 P with A and B with T")
+    stroke = takes_signal(Ratio, "0 joins P with B and A with T, 1 P with A and B with T", low=0, high=1)
     q_supply_a = observable(Flow, "flow from P to A")
     q_supply_b = observable(Flow, "flow from P to B")
     q_a_tank = observable(Flow, "flow from A to T")
@@ -164,18 +164,18 @@ class FourTwoValve(Metering, Lapped, Component):
 class FourThreeValve(Metering, Lapped, Component):
     r"""4/3 proportional directional valve with four edges.
 
-    .. math:: q_{jk} = C_d\, s\, A_{jk} \sqrt{2|p_j - p_k|/\rho}\, \mathrm{sign}(p_j - p_k), \quad
+    .. math:: q_{jk} = C_d\, s\, A_{jk} \sqrt{2\rho|p_j - p_k|}/\rho_0\, \mathrm{sign}(p_j - p_k), \quad
               s_{PA} = s(x, u), \; s_{BT} = s(x, u_T), \; s_{PB} = s(-x, u), \; s_{AT} = s(-x, u_T)
 
     x = `stroke` [-], counted within -1 and 1: above 0 P feeds A and B returns to T, below 0 P feeds B and A returns; p
     [Pa]; s(x, u) = (x - u)/(1 - u) [-], 0 below the overlap u, its corner rounded within `edge_rounding` as in
     `two_two_valve`; u = `overlap` [-] of the edges at P, u_T = `tank_overlap` [-] of those at T; A = `area` [m^2], at
-    port B times `area_ratio` [-]; C_d [-] follows the flow number as there; \rho [kg/m^3] at the mean pressure. With a
-    critical centre, equal edges and a load p_L = p_A - p_B on equal flows this is the textbook's q = C_d s A
-    sqrt((p_s - sign(x) p_L)/\rho) for p_T = 0. The centre is closed for overlaps from `edge_rounding` on; critical at
-    0, where each edge is open by a quarter of that; open (all ports joined) for overlaps below 0; float (A and B to T,
-    P closed) for `tank_overlap` alone below 0; P joined to A and B for `overlap` alone below 0; tandem (P to T, A and B
-    closed) for overlaps above 0 and a `tandem_area` A_PT [m^2], open by s_PT = (c - |x|)/c [-] up to c =
+    port B times `area_ratio` [-]; C_d [-] follows the flow number as there; \rho [kg/m^3] at the mean pressure, \rho_0
+    at 0 bar gauge. With a critical centre, equal edges and a load p_L = p_A - p_B on equal flows this is the textbook's
+    q = C_d s A sqrt((p_s - sign(x) p_L)/\rho) for p_T = 0. The centre is closed for overlaps from `edge_rounding` on;
+    critical at 0, where each edge is open by a quarter of that; open (all ports joined) for overlaps below 0; float (A
+    and B to T, P closed) for `tank_overlap` alone below 0; P joined to A and B for `overlap` alone below 0; tandem (P
+    to T, A and B closed) for overlaps above 0 and a `tandem_area` A_PT [m^2], open by s_PT = (c - |x|)/c [-] up to c =
     `tandem_stroke` [-], with corners as of the edges. Not for leakage, nor for cavitating flow.
     Source: H. E. Merritt, Hydraulic Control Systems (1967), chapter 5, four-way spool valve; ISO 1219-1, centres.
     """
@@ -191,7 +191,7 @@ class FourThreeValve(Metering, Lapped, Component):
     a = takes_pressure("work port A")
     b = takes_pressure("work port B")
     tank = takes_pressure("tank port T")
-    stroke = takes_signal(Ratio, "-1 to 1; above 0 joins P with A and B with T")
+    stroke = takes_signal(Ratio, "above 0 joins P with A and B with T, below 0 P with B and A with T", low=-1, high=1)
     q_supply_a = observable(Flow, "flow from P to A")
     q_supply_b = observable(Flow, "flow from P to B")
     q_a_tank = observable(Flow, "flow from A to T")

@@ -13,7 +13,7 @@ from crescentlab.fluid import Fluid
 from crescentlab.maths import Expr, pi, sin, table, where
 from crescentlab.units import Angle, Flow, Length, Ratio
 
-from .flow_laws import local_loss_velocity, pipe_friction_flow
+from .flow_laws import local_loss_flow, pipe_friction_flow
 
 DEGREE = pi / 180
 
@@ -22,13 +22,14 @@ class LocalLoss(Component):
     r"""Local loss by its coefficient on the dynamic head: valves, tees, entries, exits.
 
     .. math:: p_a - p_b = \left(\zeta + \frac{K_1}{Re}\right) \frac{\rho v |v|}{2}, \quad
-              v = \frac{4 q}{n \pi d^2}, \quad Re = \frac{|v| d}{\nu}
+              v = \frac{4 \rho_0 q}{n \pi d^2 \rho}, \quad Re = \frac{|v| d}{\nu}
 
     p [Pa] gauge, total; d = `diameter` [m] to which \zeta = `loss_coefficient` [-] refers; from b to a
-    `loss_coefficient_back` counts, by default the same; K_1 = `laminar_coefficient` [-]; n = `parallel` [-]; \rho
-    [kg/m^3], \nu [m^2/s] at the mean pressure. Some pairs K_1, \zeta by Hooper: pipe entry 160, 0.5; ball or gate valve
-    300, 0.1; globe valve 1500, 4; lift check valve 2000, 10; tee, branch 800, 0.8; in small bores \zeta is larger, by
-    the factor 1 + 25.4 mm/d, but not that of entries. Not for losses that stand so close that they disturb each other.
+    `loss_coefficient_back` counts, by default the same; K_1 = `laminar_coefficient` [-]; n = `parallel` [-]; q [m^3/s]
+    mass flow over \rho_0; \rho [kg/m^3], \nu [m^2/s] at the mean pressure. Some pairs K_1, \zeta by Hooper: pipe entry
+    160, 0.5; ball or gate valve 300, 0.1; globe valve 1500, 4; lift check valve 2000, 10; tee, branch 800, 0.8; in
+    small bores \zeta is larger, by the factor 1 + 25.4 mm/d, but not that of entries. Not for losses that stand so
+    close that they disturb each other.
     Source: W. B. Hooper, Chem. Eng. 88 (1981) 17, 96-100; I. E. Idelchik, Handbook of Hydraulic Resistance.
     """
 
@@ -47,8 +48,8 @@ class LocalLoss(Component):
         loss: Any = self.loss_coefficient
         if self.loss_coefficient_back is not None:
             loss = where(p_a > p_b, self.loss_coefficient, self.loss_coefficient_back)
-        v = local_loss_velocity(p_a, p_b, self.diameter, loss, self.laminar_coefficient, fluid)
-        q = self.parallel * pi / 4 * self.diameter * self.diameter * v
+        one = local_loss_flow(p_a, p_b, self.diameter, loss, self.laminar_coefficient, fluid)
+        q = self.parallel * one
         return {"q_a": q, "q_b": -q, "q": q}
 
 
@@ -124,7 +125,8 @@ class Elbow(Component):
               \zeta = 0.9457 \sin^2\frac{\delta}{2} + 2.047 \sin^4\frac{\delta}{2}
 
     p [Pa] gauge, total; d = `diameter` [m]; \delta = `angle` [rad]; K_1 = `laminar_coefficient` [-], by default that of
-    90 degrees; v [m/s] mean velocity in the bore; Re = |v| d/\nu [-]; \rho [kg/m^3], \nu [m^2/s] at the mean pressure.
+    90 degrees; v [m/s] mean velocity in the bore, that of q as in `local_loss`; Re = |v| d/\nu [-]; \rho [kg/m^3], \nu
+    [m^2/s] at the mean pressure.
     Later sources give from 0.8 to 1.2 at 90 degrees; Idelchik takes 1.2 times this formula there and 2.5 times at 20
     degrees. Not for corners closer to each other than some diameters. Source: J. Weisbach's formula of elbows, in I. E.
     Idelchik, Handbook of Hydraulic Resistance, chapter 6; K_1 of a mitred corner: W. B. Hooper, Chem. Eng. 88 (1981)
@@ -145,8 +147,7 @@ class Elbow(Component):
     def equations(self, p_a: Expr, p_b: Expr, fluid: Fluid) -> Equations:
         squared = sin(self.angle / 2) ** 2
         loss = 0.9457 * squared + 2.047 * squared * squared
-        v = local_loss_velocity(p_a, p_b, self.diameter, loss, self.laminar_coefficient, fluid)
-        q = pi / 4 * self.diameter * self.diameter * v
+        q = local_loss_flow(p_a, p_b, self.diameter, loss, self.laminar_coefficient, fluid)
         return {"q_a": q, "q_b": -q, "q": q}
 
 
@@ -156,12 +157,12 @@ class SuddenExpansion(Component):
     .. math:: p_a - p_b = \left(\zeta + \frac{K_1}{Re}\right) \frac{\rho v |v|}{2}, \quad
               \zeta_{ab} = (1 - A_1/A_2)^2, \quad \zeta_{ba} = \tfrac12 (1 - A_1/A_2)^{3/4}
 
-    p [Pa] gauge, total: what the expansion wins back from the dynamic head is not in the drop; v [m/s], Re [-] in the
-    narrow section A_1 of `narrow_diameter`; A_2 [m^2] of `wide_diameter`; K_1 = `laminar_coefficient` [-]; \rho
-    [kg/m^3], \nu [m^2/s] at the mean pressure. From Re = 10 to 5000 the diagrams' tables have more: a contraction up
-    to 1.7 times, an expansion up to 3 times, at Re = 1000. Not for tapered pipes. Source: Borda-Carnot, from the
-    balance of momentum; contraction, and K_1 = 30 below Re = 10: I. E. Idelchik, Handbook of Hydraulic Resistance,
-    diagrams 4-1, 4-9 and 4-10.
+    p [Pa] gauge, total: what the expansion wins back from the dynamic head is not in the drop; v [m/s], Re [-] of q as
+    in `local_loss`, in the narrow section A_1 of `narrow_diameter`; A_2 [m^2] of `wide_diameter`; K_1 =
+    `laminar_coefficient` [-]; \rho [kg/m^3], \nu [m^2/s] at the mean pressure. From Re = 10 to 5000 the diagrams'
+    tables have more: a contraction up to 1.7 times, an expansion up to 3 times, at Re = 1000. Not for tapered pipes.
+    Source: Borda-Carnot, from the balance of momentum; contraction, and K_1 = 30 below Re = 10: I. E. Idelchik,
+    Handbook of Hydraulic Resistance, diagrams 4-1, 4-9 and 4-10.
     """
 
     narrow_diameter: Length = Field(gt=0, description="of the narrow section")
@@ -190,8 +191,7 @@ class SuddenExpansion(Component):
         """Flow [m^3/s] from the narrow into the wide section."""
         ratio = (self.narrow_diameter / self.wide_diameter) ** 2
         loss = where(p_narrow > p_wide, (1 - ratio) ** 2, 0.5 * (1 - ratio) ** 0.75)
-        v = local_loss_velocity(p_narrow, p_wide, self.narrow_diameter, loss, self.laminar_coefficient, fluid)
-        return pi / 4 * self.narrow_diameter * self.narrow_diameter * v
+        return local_loss_flow(p_narrow, p_wide, self.narrow_diameter, loss, self.laminar_coefficient, fluid)
 
 
 class SuddenContraction(SuddenExpansion):

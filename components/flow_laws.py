@@ -1,7 +1,11 @@
 """Flow through orifices, gaps and pipes as pure functions of pressures and dimensions. No components here.
 
-All work on floats, vectors and symbols, in SI; density and viscosity are taken at the mean of the two pressures;
-every Jacobian is finite, also at zero pressure drop, zero area and zero flow.
+A flow q is mass flow over the density rho_0 at 0 bar gauge. A resistance's law gives its volume flow Q at the mean of
+its two pressures, where density and viscosity are taken, and :func:`referred_flow` makes q of it there: a turbulent
+edge passes the mass flow C_d A sqrt(2 rho dp), a gap b h^3 dp/(12 nu l).
+
+All work on floats, vectors and symbols, in SI; every Jacobian is finite, also at zero pressure drop, zero area and zero
+flow.
 """
 
 from typing import Any
@@ -23,6 +27,16 @@ _CRITICAL = 2300.0
 
 _SLOWEST = 1e-6
 """Below this dimensionless drop a short tube's resistance is that of developed laminar flow to 1e-9: numerics."""
+
+
+def referred_flow(volume_flow: Any, p: Any, fluid: Fluid) -> Any:
+    r"""Flow q [m^3/s], mass flow over the density at 0 bar gauge, of a volume flow at a pressure.
+
+    .. math:: q = \frac{\rho(p)}{\rho_0} Q
+
+    Q = `volume_flow` [m^3/s] at p [Pa, gauge]; \rho_0 [kg/m^3] at 0 bar gauge. Source: conservation of mass.
+    """
+    return fluid.density(p) / fluid.rho_0 * volume_flow
 
 
 def hydraulic_diameter_of(area: Any, rounding: Any = DIAMETER_ROUNDING) -> Any:
@@ -48,35 +62,35 @@ def orifice_flow(
 ) -> Any:  # fmt: skip
     r"""Flow [m^3/s] from a to b through a sharp-edged orifice, laminar at small flow numbers.
 
-    .. math:: q = C_d A \sqrt{2|\Delta p|/\rho}\;\mathrm{sign}\,\Delta p, \quad
+    .. math:: q = \frac{\rho}{\rho_0} C_d A \sqrt{2|\Delta p|/\rho}\;\mathrm{sign}\,\Delta p, \quad
               C_d = C_{d,max} \tanh(2\lambda/\lambda_c), \quad \lambda = (d_h/\nu)\sqrt{2|\Delta p|/\rho}
 
     \Delta p = p_a - p_b [Pa]; A = `area` [m^2]; d_h = `hydraulic_diameter` [m], None for
     :func:`hydraulic_diameter_of` the area; C_d,max [-]; \lambda_c [-] critical flow number; \rho [kg/m^3],
-    \nu [m^2/s] at the mean pressure. Evaluated as A C_d,max k (2\Delta p/\rho) tanh(r)/r with
+    \nu [m^2/s] at the mean pressure, \rho_0 at 0 bar gauge. Evaluated as A C_d,max k (2\Delta p/\rho_0) tanh(r)/r with
     k = 2 d_h/(\nu \lambda_c), r = k sqrt(2|\Delta p|/\rho), the same function without a root at zero drop.
-    Not for cavitating flow. Source: Rundo & Corvaglia (2016), Eqs. 27-29.
+    Not for cavitating flow. Source: Rundo & Corvaglia (2016), Eqs. 27-29, as a mass flow.
     """
     mean: Any = (p_a + p_b) / 2
     drop = p_a - p_b
     d_h = hydraulic_diameter_of(area) if hydraulic_diameter is None else hydraulic_diameter
-    rho = fluid.density(mean)
     k = 2 * d_h / (fluid.kinematic_viscosity(mean) * lambda_c)
-    return area * cd_max * k * (2 * drop / rho) * tanh_over(k * k * 2 * fabs(drop) / rho)
+    r_squared = k * k * 2 * fabs(drop) / fluid.density(mean)
+    return area * cd_max * k * (2 * drop / fluid.rho_0) * tanh_over(r_squared)
 
 
 def slot_flow(p_a: Any, p_b: Any, width: Any, height: Any, length: Any, fluid: Fluid) -> Any:
     r"""Flow [m^3/s] from a to b through a flat slot, laminar.
 
-    .. math:: q = \frac{b h^3}{12 \mu l} (p_a - p_b)
+    .. math:: q = \frac{\rho}{\rho_0} \frac{b h^3}{12 \mu l} (p_a - p_b)
 
-    b = `width`, h = `height`, l = `length` [m]; \mu [Pa s] at the mean pressure. A negative height counts as
-    zero. Not for h close to b, nor for turbulent gaps. Source: plane Poiseuille flow; Rundo & Corvaglia (2016),
-    Eqs. 17, 18, 20, 22, 24-26.
+    b = `width`, h = `height`, l = `length` [m]; \mu [Pa s], \rho [kg/m^3] at the mean pressure, \rho_0 at 0 bar gauge;
+    \rho/\mu is 1/\nu. A negative height counts as zero. Not for h close to b, nor for turbulent gaps.
+    Source: plane Poiseuille flow; Rundo & Corvaglia (2016), Eqs. 17, 18, 20, 22, 24-26, as a mass flow.
     """
     mean: Any = (p_a + p_b) / 2
     open_height = maximum(height, 0.0)
-    return width * open_height**3 / (12 * fluid.dynamic_viscosity(mean) * length) * (p_a - p_b)
+    return width * open_height**3 / (12 * fluid.kinematic_viscosity(mean) * fluid.rho_0 * length) * (p_a - p_b)
 
 
 def annular_flow(
@@ -84,24 +98,27 @@ def annular_flow(
 ) -> Any:  # fmt: skip
     r"""Flow [m^3/s] from a to b through a narrow annulus round an eccentric shaft, laminar.
 
-    .. math:: q = \frac{\pi d c^3 (1 + 1.5 \varepsilon^2)}{12 \mu l} (p_a - p_b)
+    .. math:: q = \frac{\rho}{\rho_0} \frac{\pi d c^3 (1 + 1.5 \varepsilon^2)}{12 \mu l} (p_a - p_b)
 
     d = `diameter` [m]; c = `clearance` [m], radial (half the difference of the diameters); \varepsilon [-]
-    eccentricity over c; l = `length` [m]; \mu [Pa s] at the mean pressure. With d = 2 R it is
-    \pi R c^3 (1 + 1.5\varepsilon^2)/(6 \mu l) of the paper. Source: Rundo & Corvaglia (2016), Eq. 23.
+    eccentricity over c; l = `length` [m]; \mu [Pa s], \rho [kg/m^3] at the mean pressure, \rho_0 at 0 bar gauge. With
+    d = 2 R the volume flow is \pi R c^3 (1 + 1.5\varepsilon^2)/(6 \mu l) of the paper.
+    Source: Rundo & Corvaglia (2016), Eq. 23.
     """
     wider = 1 + 1.5 * eccentricity * eccentricity
     return slot_flow(p_a, p_b, pi * diameter * wider, clearance, length, fluid)
 
 
-def drag_flow(velocity: Any, width: Any, height: Any) -> Any:
+def drag_flow(p_a: Any, p_b: Any, velocity: Any, width: Any, height: Any, fluid: Fluid) -> Any:
     r"""Flow [m^3/s] dragged along a slot by its moving wall (Couette), towards the wall's `velocity` [m/s].
 
-    .. math:: q = \tfrac12 b h v
+    .. math:: q = \frac{\rho}{\rho_0} \tfrac12 b h v
 
-    b = `width`, h = `height` [m]. Source: Rundo & Corvaglia (2016), second term of Eqs. 24 and 25.
+    b = `width`, h = `height` [m]; \rho [kg/m^3] at the mean of the pressures at its two ends, as that of the flow which
+    they drive through the same slot; \rho_0 at 0 bar gauge.
+    Source: plane Couette flow; Rundo & Corvaglia (2016), second term of Eqs. 24 and 25, as a mass flow.
     """
-    return width * height * velocity / 2
+    return referred_flow(width * height * velocity / 2, (p_a + p_b) / 2, fluid)
 
 
 def friction_times_reynolds(reynolds: Any, relative_roughness: Any) -> Any:
@@ -179,19 +196,22 @@ def rising_root(drop: Any, linear: Any, quadratic: Any) -> Any:
     return 2 * drop / (linear + sqrt(linear * linear + 4 * quadratic * fabs(drop)))
 
 
-def local_loss_velocity(p_a: Any, p_b: Any, diameter: Any, loss: Any, laminar: Any, fluid: Fluid) -> Any:
-    r"""Mean velocity [m/s] at a local loss, from a to b.
+def local_loss_flow(p_a: Any, p_b: Any, diameter: Any, loss: Any, laminar: Any, fluid: Fluid) -> Any:
+    r"""Flow [m^3/s] from a to b through a local loss in a round bore.
 
-    .. math:: p_a - p_b = \left(\zeta + \frac{K_1}{Re}\right) \frac{\rho v |v|}{2}, \quad Re = \frac{|v| d}{\nu}
+    .. math:: p_a - p_b = \left(\zeta + \frac{K_1}{Re}\right) \frac{\rho v |v|}{2}, \quad Re = \frac{|v| d}{\nu}, \quad
+              q = \frac{\rho}{\rho_0} \frac{\pi}{4} d^2 v
 
-    \zeta = `loss` [-] at high Reynolds numbers; K_1 = `laminar` [-] > 0; d = `diameter` [m] where v is; \rho
-    [kg/m^3], \nu [m^2/s] at the mean pressure. Source: W. B. Hooper, Chem. Eng. 88 (1981) 17, 96-100;
-    Altshul's form in I. E. Idelchik, Handbook of Hydraulic Resistance.
+    \zeta = `loss` [-] at high Reynolds numbers; K_1 = `laminar` [-] > 0; d = `diameter` [m] where v [m/s] is; \rho
+    [kg/m^3], \nu [m^2/s] at the mean pressure, \rho_0 at 0 bar gauge.
+    Source: W. B. Hooper, Chem. Eng. 88 (1981) 17, 96-100; Altshul's form in I. E. Idelchik, Handbook of Hydraulic
+    Resistance.
     """
     mean: Any = (p_a + p_b) / 2
     rho = fluid.density(mean)
     linear = laminar * rho * fluid.kinematic_viscosity(mean) / (2 * diameter)
-    return rising_root(p_a - p_b, linear, loss * rho / 2)
+    v = rising_root(p_a - p_b, linear, loss * rho / 2)
+    return referred_flow(pi / 4 * diameter * diameter * v, mean, fluid)
 
 
 def pipe_friction_flow(
@@ -217,7 +237,7 @@ def pipe_friction_flow(
         known, roughness / diameter, loss_coefficient * per_length, laminar_coefficient * per_length
     )
     v = drop * 2 * diameter * diameter / (rho * nu * length * per_reynolds)
-    return pi / 4 * diameter * diameter * v * rho / fluid.rho_0
+    return referred_flow(pi / 4 * diameter * diameter * v, mean, fluid)
 
 
 def _resistance_at(known: Any, relative_roughness: Any, local: Any, laminar: Any) -> Any:
@@ -247,13 +267,14 @@ def _laminar_resistance_at(known: Any, local: Any, creeping: Any) -> Any:
 def short_tube_flow(p_a: Any, p_b: Any, diameter: Any, length: Any, fluid: Fluid) -> Any:
     r"""Flow [m^3/s] from a to b through a short tube with sharp entry and developing laminar flow.
 
-    .. math:: \Delta p = \xi \frac{\rho v |v|}{2}, \quad
+    .. math:: \Delta p = \xi \frac{\rho v |v|}{2}, \quad q = \frac{\rho}{\rho_0} \frac{\pi}{4} d^2 v, \quad
               \xi = w \left(1.5 + 13.74 \sqrt{x}\right) + (1 - w) \left(2.28 + 64 x\right), \quad
               w = \frac{C}{C + x^2}, \quad x = \frac{l \nu}{d^2 |v|}
 
     d = `diameter`, l = `length` [m]; v [m/s]; x = l/(d Re) [-]; C = 0.000212; \rho [kg/m^3], \nu [m^2/s] at the mean
-    pressure. Merritt's two formulas, C_d = \xi^{-1/2} for x below and above 1/50, differ by 1.7 % there; Shah's weight
-    w joins them and stays within 1.5 % of the flow of the one that holds. Solved by Newton's method on the logarithms.
+    pressure, \rho_0 at 0 bar gauge. Merritt's two formulas, C_d = \xi^{-1/2} for x below and above 1/50, differ by
+    1.7 % there; Shah's weight w joins them and stays within 1.5 % of the flow of the one that holds. Solved by Newton's
+    method on the logarithms.
     Source: H. E. Merritt, Hydraulic Control Systems (1967), chapter 3, after Shapiro, Siegel & Kline (1954); R. K.
     Shah, J. Fluids Eng. 100 (1978) 177-179.
     """
@@ -262,7 +283,8 @@ def short_tube_flow(p_a: Any, p_b: Any, diameter: Any, length: Any, fluid: Fluid
     rho, nu = fluid.density(mean), fluid.kinematic_viscosity(mean)
     unit = nu * length / (diameter * diameter)
     resistance = _entrance_resistance_at(2 * fabs(drop) / (rho * unit * unit))
-    return pi / 4 * diameter * diameter * 2 * drop / (rho * unit * resistance)
+    v = 2 * drop / (rho * unit * resistance)
+    return referred_flow(pi / 4 * diameter * diameter * v, mean, fluid)
 
 
 def _entrance_resistance_at(known: Any) -> Any:
@@ -289,12 +311,10 @@ def _entrance_and_slope(y: Any) -> tuple[Any, Any]:
 def radial_flow(p_a: Any, p_b: Any, inner: Any, outer: Any, height: Any, angle: Any, fluid: Fluid) -> Any:
     r"""Flow [m^3/s] between parallel discs from the inner edge a to the outer edge b, laminar.
 
-    .. math:: q = \frac{\alpha h^3}{12 \mu \ln(d_2/d_1)} (p_a - p_b)
+    .. math:: q = \frac{\rho}{\rho_0} \frac{\alpha h^3}{12 \mu \ln(d_2/d_1)} (p_a - p_b)
 
     d_1 = `inner`, d_2 = `outer` diameter, h = `height` [m]; \alpha = `angle` [rad] of the sector, 2 \pi for a whole
-    disc: \pi h^3 \Delta p/(6 \mu \ln(r_2/r_1)); \mu [Pa s] at the mean pressure. A negative height counts as zero.
+    disc, whose volume flow is \pi h^3 \Delta p/(6 \mu \ln(r_2/r_1)); all else as in :func:`slot_flow`.
     Source: Poiseuille flow between parallel discs; H. E. Merritt, Hydraulic Control Systems (1967), chapter 3.
     """
-    mean: Any = (p_a + p_b) / 2
-    open_height = maximum(height, 0.0)
-    return angle * open_height**3 / (12 * fluid.dynamic_viscosity(mean) * log(outer / inner)) * (p_a - p_b)
+    return slot_flow(p_a, p_b, angle, height, log(outer / inner), fluid)

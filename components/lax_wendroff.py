@@ -29,11 +29,14 @@ from .wave_laws import (
 CELL_LENGTH_OVER_DIAMETER = 6
 """Length over diameter [-] of the cells, where `internal_nodes` is not given."""
 
+LOSS_STEPS = 3
+"""Steps to the density ahead of an entry loss, each to a share of loss over bulk modulus: numerics."""
+
 
 def _start_pressures(line: "LaxWendroffLine", fluid: Fluid | None = None) -> np.ndarray:
     if fluid is None:
         return np.full(line.nodes, line.start_pressure)
-    loss: Any = line.entry_loss(fluid) * line.start_flow * abs(line.start_flow)
+    loss: Any = line.entry_loss(line.start_pressure, fluid) * line.start_flow * abs(line.start_flow)
     gradient = line.friction(fluid)(line.start_flow, line.start_pressure - loss)
     return np.asarray(line.start_pressure - loss - gradient * np.linspace(0.0, line.length, line.nodes))
 
@@ -51,7 +54,7 @@ class LaxWendroffLine(Component):
     \Delta t = \nu \Delta x/a(p_{max}) [s], \nu = `courant_number` [-], a [m/s] the wave speed. Between two ticks an
     end sees the wave that arrives there, p - Z q along dx/dt = -a (at b mirrored), Z = \rho_0 a/A [Pa s/m^3], from
     the foot of its characteristic; what the end then has becomes its node's value at the tick, so that neither jumps.
-    The entry loss K \rho_0 q|q|/(2 A^2) [Pa] sits at end a. The fluid in the nodes, half cells at the ends, changes by
+    The entry loss K \rho(p_a) v|v|/2 [Pa] sits at end a. The fluid in the nodes, half cells at the ends, changes by
     what the ends take in, exactly. Valid while (a + |v|) \Delta t/\Delta x, the observable `courant`, is below 1.
     It keeps no books of energy: of what passes an end between two ticks only the fluid is summed up, and what the
     scheme takes from steep waves at a tick is no friction.
@@ -119,11 +122,11 @@ class LaxWendroffLine(Component):
         """
         series = line_series(omega, self.diameter, self.roughness, fluid, p_mean, q_mean)
         shunt = line_shunt(omega, self.diameter, fluid, p_mean)
-        return two_port_of(series, shunt, self.length, 2 * float(self.entry_loss(fluid)) * abs(q_mean))
+        return two_port_of(series, shunt, self.length, 2 * float(self.entry_loss(p_mean, fluid)) * abs(q_mean))
 
-    def entry_loss(self, fluid: Fluid) -> Any:
-        """k of the entry loss k q|q| [Pa s^2/m^6]."""
-        return self.loss_coefficient * fluid.rho_0 / (2 * self.area * self.area)
+    def entry_loss(self, p: Any, fluid: Fluid) -> Any:
+        """k of the entry loss k q|q| [Pa s^2/m^6], which is K rho v|v|/2 at p [Pa]."""
+        return self.loss_coefficient * fluid.rho_0 * fluid.rho_0 / (2 * fluid.density(p) * self.area * self.area)
 
     def friction(self, fluid: Fluid) -> Any:
         """Pressure gradient of steady friction [Pa/m] as a function of q and p."""
@@ -138,7 +141,7 @@ class LaxWendroffLine(Component):
 
     def flow_at_a(self, p: Expr, wave: Wave, fluid: Fluid) -> Any:
         """q_a from the pressure taken there."""
-        return end_flow(p, wave, self.entry_loss(fluid), self.area, fluid)
+        return end_flow(p, wave, self.entry_loss(p, fluid), self.area, fluid)
 
     def flow_at_b(self, p: Expr, wave: Wave, fluid: Fluid) -> Any:
         """q_b from the pressure taken there."""
@@ -146,7 +149,10 @@ class LaxWendroffLine(Component):
 
     def pressure_at_a(self, q: Expr, wave: Wave, fluid: Fluid) -> Any:
         """p_a from the flow received there."""
-        return end_pressure(q, wave, self.entry_loss(fluid), self.area, fluid)
+        behind = before = end_pressure(q, wave, 0.0, self.area, fluid)
+        for _ in range(LOSS_STEPS):
+            before = behind + self.entry_loss(before, fluid) * q * fabs(q)
+        return before
 
     def pressure_at_b(self, q: Expr, wave: Wave, fluid: Fluid) -> Any:
         """p_b from the flow received there."""
@@ -160,7 +166,7 @@ class LaxWendroffLine(Component):
         area, dx = self.area, self.cell
         dt = self.courant_number * dx / wave_speed(self.max_pressure, fluid)
         taken_a, taken_b = into_a - had_a, into_b - had_b
-        p_first, q_first = p_a - self.entry_loss(fluid) * q_a * fabs(q_a), q_a
+        p_first, q_first = p_a - self.entry_loss(p_a, fluid) * q_a * fabs(q_a), q_a
         p_last, q_last = p_b, -q_b
 
         half = half_step(p_node, q_node, dt, dx, area, self.friction(fluid), fluid)

@@ -5,21 +5,21 @@ from pydantic import Field
 from crescentlab.component import Component, Equations
 from crescentlab.domain import dissipates, observable, takes_pressure, takes_signal
 from crescentlab.fluid import Fluid
-from crescentlab.maths import Expr, maximum, sqrt
+from crescentlab.maths import Expr, sqrt
 from crescentlab.units import Area, Density, Flow, Length, Pressure, Ratio
 
-from .flow_laws import DIAMETER_ROUNDING, hydraulic_diameter_of, orifice_flow, rising_root
+from .flow_laws import DIAMETER_ROUNDING, hydraulic_diameter_of, orifice_flow, referred_flow, rising_root
 
 
 class Orifice(Component):
     r"""Sharp-edged orifice whose discharge coefficient follows the flow number.
 
-    .. math:: q = n\, C_d A \sqrt{2|\Delta p|/\rho}\; \mathrm{sign}\,\Delta p, \quad
+    .. math:: q = n\, C_d A \sqrt{2\rho|\Delta p|}/\rho_0\; \mathrm{sign}\,\Delta p, \quad
               C_d = C_{d,max} \tanh(2\lambda/\lambda_c), \quad \lambda = (d_h/\nu)\sqrt{2|\Delta p|/\rho}
 
-    \Delta p = p_a - p_b [Pa]; A = `area` [m^2]; d_h [m], by default \sqrt{4A/\pi + d_r^2} with
-    d_r = `diameter_rounding` [m]; \rho [kg/m^3] and \nu [m^2/s] at the mean pressure; n = `parallel` [-].
-    With `count` a vector of equal orifices, each between its own pair of ports. Finite Jacobian at \Delta p = 0
+    \Delta p = p_a - p_b [Pa]; A = `area` [m^2]; d_h [m], by default \sqrt{4A/\pi + d_r^2} with d_r =
+    `diameter_rounding` [m]; \rho [kg/m^3] and \nu [m^2/s] at the mean pressure, \rho_0 at 0 bar gauge; n = `parallel`
+    [-]. With `count` a vector of equal orifices, each between its own pair of ports. Finite Jacobian at \Delta p = 0
     and A = 0. Not for cavitating flow. Source: Rundo & Corvaglia (2016), Eqs. 27-29.
     """
 
@@ -47,7 +47,7 @@ class Orifice(Component):
 class Throttle(Orifice):
     r"""Load valve: an orifice of adjustable `area` at the end of a circuit.
 
-    .. math:: q = n\, C_d A \sqrt{2|\Delta p|/\rho}\; \mathrm{sign}\,\Delta p
+    .. math:: q = n\, C_d A \sqrt{2\rho|\Delta p|}/\rho_0\; \mathrm{sign}\,\Delta p
 
     \Delta p = p_a - p_b [Pa]; A = `area` [m^2], 0 is closed; \rho [kg/m^3]; C_d, n [-] and all else as in
     `orifice`. Not for cavitating flow. Source: Rundo & Corvaglia (2016), Eqs. 27-29 and section 5.
@@ -57,13 +57,13 @@ class Throttle(Orifice):
 class VariableOrifice(Component):
     r"""Orifice that a signal opens, for example while a volume exists or a valve is driven.
 
-    .. math:: q = n\, C_d\, sA \sqrt{2|\Delta p|/\rho}\; \mathrm{sign}\,\Delta p, \quad
+    .. math:: q = n\, C_d\, sA \sqrt{2\rho|\Delta p|}/\rho_0\; \mathrm{sign}\,\Delta p, \quad
               C_d = C_{d,max} \tanh(2\lambda/\lambda_c), \quad \lambda = (d_h/\nu)\sqrt{2|\Delta p|/\rho}
 
-    s = `opening` [-], share of A = `area` [m^2] that is open; below 0 counts as 0; \Delta p = p_a - p_b [Pa];
-    d_h [m], by default \sqrt{4sA/\pi + d_r^2} with d_r = `diameter_rounding` [m]; \rho [kg/m^3] and
-    \nu [m^2/s] at the mean pressure; n = `parallel` [-]. With `count` a vector of orifices, each with its own
-    opening. Finite Jacobian at \Delta p = 0 and s = 0. Not for cavitating flow.
+    s = `opening` [-], share of A = `area` [m^2] that is open; \Delta p = p_a - p_b [Pa]; d_h [m], by default
+    \sqrt{4sA/\pi + d_r^2} with d_r = `diameter_rounding` [m]; \rho [kg/m^3] and \nu [m^2/s] at the mean pressure,
+    \rho_0 at 0 bar gauge; n = `parallel` [-]. With `count` a vector of orifices, each with its own opening. Finite
+    Jacobian at \Delta p = 0 and s = 0. Not for cavitating flow.
     Source: Rundo & Corvaglia (2016), Eqs. 27-29.
     """
 
@@ -77,12 +77,12 @@ class VariableOrifice(Component):
 
     a = takes_pressure("upstream", size="count")
     b = takes_pressure("downstream", size="count")
-    opening = takes_signal(Ratio, "open share of the area", size="count")
+    opening = takes_signal(Ratio, "open share of the area", size="count", low=0, high=1)
     q = observable(Flow, "flow from a to b", size="count")
     loss = dissipates()
 
     def equations(self, p_a: Expr, p_b: Expr, opening: Expr, fluid: Fluid) -> Equations:
-        area = self.area * maximum(opening, 0.0)
+        area = self.area * opening
         d_h = self.hydraulic_diameter
         if d_h is None:
             d_h = hydraulic_diameter_of(area, self.diameter_rounding)
@@ -93,18 +93,18 @@ class VariableOrifice(Component):
 class LaminarTurbulentOrifice(Component):
     r"""Sharp-edged orifice that turns from laminar to turbulent at a Reynolds number.
 
-    .. math:: \Delta p = \frac{\rho}{2 C_d^2} \left(v|v| + \frac{\nu Re_t}{d_h} v\right), \quad q = n A v, \quad
-              Re_t = \left(\frac{C_d}{\delta}\right)^2
+    .. math:: \Delta p = \frac{\rho}{2 C_d^2} \left(v|v| + \frac{\nu Re_t}{d_h} v\right), \quad
+              q = \frac{\rho}{\rho_0} n A v, \quad Re_t = \left(\frac{C_d}{\delta}\right)^2
 
-    \Delta p = p_a - p_b [Pa]; v = q/(n A) [m/s]; A = `area` [m^2]; n = `parallel` [-]; C_d = `cd_turbulent` [-];
+    \Delta p = p_a - p_b [Pa]; v [m/s] in the hole; A = `area` [m^2]; n = `parallel` [-]; C_d = `cd_turbulent` [-];
     \delta = `laminar_coefficient` [-], 0.157 for slits and 0.2 for round holes by Wuest; exact creeping flow through a
     hole in a thin plate has 0.163, two thirds of that flow (Sampson); d_h [m], by default \sqrt{4A/\pi + d_r^2} with
-    d_r = `diameter_rounding` [m]; \rho [kg/m^3], \nu [m^2/s] at the mean pressure. Its ends are the laminar
-    q = 2 \delta^2 d_h A \Delta p/\mu and the turbulent C_d A \sqrt{2\Delta p/\rho}; at the transition Reynolds number
-    Re_t, 9.3 for \delta = 0.2, both parts of the drop are equal. Not for cavitating flow. Source: H. E. Merritt,
-    Hydraulic Control Systems (1967), chapter 3, after W. Wuest, Ing.-Archiv 22 (1954) 357-367; R. A. Sampson, Phil.
-    Trans. R. Soc. A 182 (1891) 449-518; joined smoothly, linear at zero drop, after W. Borutzky, B. Barnard, J. Thoma,
-    Simulation Modelling Practice and Theory 10 (2002) 141-152.
+    d_r = `diameter_rounding` [m]; \rho [kg/m^3], \nu [m^2/s] at the mean pressure, \rho_0 at 0 bar gauge. Its ends are
+    the laminar n A v = 2 \delta^2 d_h A \Delta p/\mu and the turbulent C_d A \sqrt{2\Delta p/\rho}; at the transition
+    Reynolds number Re_t, 9.3 for \delta = 0.2, both parts of the drop are equal. Not for cavitating flow. Source: H. E.
+    Merritt, Hydraulic Control Systems (1967), chapter 3, after W. Wuest, Ing.-Archiv 22 (1954) 357-367; R. A. Sampson,
+    Phil. Trans. R. Soc. A 182 (1891) 449-518; joined smoothly, linear at zero drop, after W. Borutzky, B. Barnard, J.
+    Thoma, Simulation Modelling Practice and Theory 10 (2002) 141-152.
     """
 
     area: Area = Field(ge=0, description="flow area; 0 is closed")
@@ -123,21 +123,25 @@ class LaminarTurbulentOrifice(Component):
         d_h = self.hydraulic_diameter
         if d_h is None:
             d_h = hydraulic_diameter_of(self.area, self.diameter_rounding)
-        rho, nu = fluid.density((p_a + p_b) / 2), fluid.kinematic_viscosity((p_a + p_b) / 2)
+        mean = (p_a + p_b) / 2
+        rho, nu = fluid.density(mean), fluid.kinematic_viscosity(mean)
         laminar = rho * nu / (2 * self.laminar_coefficient**2 * d_h)
         turbulent = rho / (2 * self.cd_turbulent**2)
-        q = self.parallel * self.area * rising_root(p_a - p_b, laminar, turbulent)
+        v = rising_root(p_a - p_b, laminar, turbulent)
+        q = referred_flow(self.parallel * self.area * v, mean, fluid)
         return {"q_a": q, "q_b": -q, "q": q}
 
 
 class RatedOrifice(Component):
     r"""Turbulent restriction known by its flow at one drop, as makers rate valves.
 
-    .. math:: q = q_r \sqrt{\frac{\rho_r}{\rho}}\; \frac{\Delta p/p_r}{\sqrt[4]{(\Delta p/p_r)^2 + (p_t/p_r)^2}}
+    .. math:: q = \frac{\rho}{\rho_0} n\, q_r \sqrt{\frac{\rho_r}{\rho}}\;
+              \frac{\Delta p/p_r}{\sqrt[4]{(\Delta p/p_r)^2 + (p_t/p_r)^2}}
 
     \Delta p = p_a - p_b [Pa]; q_r = `rated_flow` [m^3/s] at p_r = `rated_drop` [Pa] with an oil of \rho_r =
-    `reference_density` [kg/m^3]; \rho [kg/m^3] at the mean pressure; p_t = `transition_drop` [Pa], below which the root
-    turns into a straight line: a relative change of (p_t/\Delta p)^2/4 above it. Not for small flows of thick oil,
+    `reference_density` [kg/m^3], by volume as it passes; n = `parallel` [-]; \rho [kg/m^3] at the mean pressure, \rho_0
+    at 0 bar gauge; p_t = `transition_drop` [Pa], below which the root turns into a straight line: a relative change of
+    (p_t/\Delta p)^2/4 above it. Not for small flows of thick oil,
     where viscosity counts: `orifice` or `measured_resistance`.
     Source: orifice equation; rounded as in Simscape's hydraulic orifices, MathWorks documentation.
     """
@@ -155,7 +159,7 @@ class RatedOrifice(Component):
 
     def equations(self, p_a: Expr, p_b: Expr, fluid: Fluid) -> Equations:
         drop, transition = (p_a - p_b) / self.rated_drop, self.transition_drop / self.rated_drop
-        root = sqrt(sqrt(drop * drop + transition * transition))
-        lighter = sqrt(self.reference_density / fluid.density((p_a + p_b) / 2))
-        q = self.parallel * self.rated_flow * lighter * drop / root
+        root, mean = sqrt(sqrt(drop * drop + transition * transition)), (p_a + p_b) / 2
+        lighter = sqrt(self.reference_density / fluid.density(mean))
+        q = referred_flow(self.parallel * self.rated_flow * lighter * drop / root, mean, fluid)
         return {"q_a": q, "q_b": -q, "q": q}

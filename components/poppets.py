@@ -10,7 +10,7 @@ from crescentlab.fluid import Fluid
 from crescentlab.maths import Expr, cos, maximum, minimum, pi, sin, sqrt
 from crescentlab.units import Angle, Area, Flow, Force, Length, Ratio
 
-from .flow_laws import orifice_flow
+from .flow_laws import orifice_flow, referred_flow
 from .valve_laws import Jet, opening
 
 
@@ -56,8 +56,8 @@ class _Poppet(Jet, Seat):
         issue = self.jet(p_a, p_b, passed, hydraulic_diameter, cosine, fluid)
         force = p_a * self.bore + p_b * self.ring - issue.force
         return {
-            "q_a": issue.q + fluid.density(p_a) / fluid.rho_0 * self.bore * v_rod,
-            "q_b": -issue.q + fluid.density(p_b) / fluid.rho_0 * self.ring * v_rod,
+            "q_a": issue.q + referred_flow(self.bore * v_rod, p_a, fluid),
+            "q_b": -issue.q + referred_flow(self.ring * v_rod, p_b, fluid),
             "f_rod": -force,
             "q": issue.q,
             "area": passed,
@@ -69,18 +69,18 @@ class _Poppet(Jet, Seat):
 class ConicalPoppet(_Poppet, Component):
     r"""Conical poppet on a sharp-edged seat.
 
-    .. math:: q = C_d A \sqrt{2|\Delta p|/\rho}\, \mathrm{sign}\,\Delta p, \quad
+    .. math:: q = C_d A \sqrt{2\rho|\Delta p|}/\rho_0\, \mathrm{sign}\,\Delta p, \quad
               A = \pi x \sin\alpha\, (d - x \sin\alpha \cos\alpha), \quad
-              F = p_a A_s + p_b A_r - F_{jet}, \quad F_{jet} = k \rho |q| v_{jet} \cos\alpha
+              F = p_a A_s + p_b A_r - F_{jet}, \quad F_{jet} = k \rho_0 |q| v_{jet} \cos\alpha
 
     \Delta p = p_a - p_b [Pa]; x [m] lift of the rod above `seat_position`; d = `seat_diameter`; \alpha = `half_angle`
     [rad] of the cone, along which the jet leaves; A at most the bore A_s = \pi d^2/4 [m^2]; A_r [m^2] the face outside
     the seat, up to `face_diameter`; C_d [-] follows the flow number as in `orifice`, with the hydraulic diameter 2 x
     \sin\alpha up to the lift of the largest A; v_jet = \sqrt{2|\Delta p|/\rho} [m/s]; \rho [kg/m^3], \nu [m^2/s] at the
-    mean pressure; k = `jet_coefficient` [-]. F [N] on the poppet, towards increasing x. F_jet closes whichever way the
-    fluid flows, for k = 1; a deflecting rim makes k smaller, or negative: it opens. Left out: the momentum in the bore,
-    which opens. The poppet takes in A_s v at a and A_r v at b. Its back is a `spool_end`, its seat the stop of the
-    mass. Not for seats with a chamfer wider than the lift, nor for cavitating flow.
+    mean pressure, \rho_0 at 0 bar gauge; k = `jet_coefficient` [-]. F [N] on the poppet, towards increasing x. F_jet
+    closes whichever way the fluid flows, for k = 1; a deflecting rim makes k smaller, or negative: it opens. Left out:
+    the momentum in the bore, which opens. The poppet takes in A_s v at a and A_r v at b. Its back is a `spool_end`, its
+    seat the stop of the mass. Not for seats with a chamfer wider than the lift, nor for cavitating flow.
     Source: D. McCloy, H. R. Martin, Control of Fluid Power (1980), poppet valves; geometry of a cone's frustum.
     """
 
@@ -106,7 +106,7 @@ class ConicalPoppet(_Poppet, Component):
 class BallPoppet(_Poppet, Component):
     r"""Ball on a sharp-edged seat.
 
-    .. math:: q = C_d A \sqrt{2|\Delta p|/\rho}\, \mathrm{sign}\,\Delta p, \quad
+    .. math:: q = C_d A \sqrt{2\rho|\Delta p|}/\rho_0\, \mathrm{sign}\,\Delta p, \quad
               A = \pi r \frac{x (2 h_0 + x)}{l}, \quad l = \sqrt{r^2 + (h_0 + x)^2}, \quad h_0 = \sqrt{R^2 - r^2}
 
     \Delta p = p_a - p_b [Pa]; x [m] lift of the rod above `seat_position`; R = `ball_diameter`/2 [m], r =
@@ -150,16 +150,16 @@ class BallPoppet(_Poppet, Component):
 class FlapperNozzle(Component):
     r"""Nozzle before a flapper (baffle), and the force of its jet.
 
-    .. math:: q = C_d A \sqrt{2|\Delta p|/\rho}\, \mathrm{sign}\,\Delta p, \quad A = \pi d h, \quad
-              F = A_N \left( \Delta p + \frac{\rho}{2} \frac{q^2}{A_N^2} \right), \quad A_N = \frac{\pi}{4} d^2
+    .. math:: q = C_d A \sqrt{2\rho|\Delta p|}/\rho_0\, \mathrm{sign}\,\Delta p, \quad A = \pi d h, \quad
+              F = A_N \left( \Delta p + \frac{\rho_0^2 q^2}{2 \rho A_N^2} \right), \quad A_N = \frac{\pi}{4} d^2
 
     \Delta p = p_a - p_b [Pa]; d = `diameter` [m]; h = `gap` \pm x [m], x [m] of the flapper, + where the nozzle's jet
     `pushes_up`, towards increasing x; h < 0 is closed; A at most A_N [m^2], from h = d/4 on the nozzle itself meters.
     C_d [-] follows the flow number as in `orifice`, with the hydraulic diameter 2 h; \rho [kg/m^3], \nu [m^2/s] at the
-    mean pressure. F [N] on the flapper, away from the nozzle: in the curtain's range A_N \Delta p
-    (1 + 16 C_d^2 h^2/d^2); the second term is left out for flow into the nozzle. Two nozzles that face each other, one
-    pushing up and one down, make a double flapper. Not for nozzles with a rim wider than the gap, nor for cavitating
-    flow. Source: H. E. Merritt, Hydraulic Control Systems (1967), chapter 5, flow forces on flapper valves.
+    mean pressure, \rho_0 at 0 bar gauge. F [N] on the flapper, away from the nozzle: in the curtain's range A_N \Delta
+    p (1 + 16 C_d^2 h^2/d^2); the second term is left out for flow into the nozzle. Two nozzles that face each other,
+    one pushing up and one down, make a double flapper. Not for nozzles with a rim wider than the gap, nor for
+    cavitating flow. Source: H. E. Merritt, Hydraulic Control Systems (1967), chapter 5, flow forces on flapper valves.
     """
 
     diameter: Length = Field(gt=0, description="bore of the nozzle")
@@ -185,6 +185,6 @@ class FlapperNozzle(Component):
         nozzle = pi / 4 * self.diameter * self.diameter
         area = minimum(pi * self.diameter * h, nozzle)
         q = orifice_flow(p_a, p_b, area, 2 * h, self.cd_max, self.lambda_c, fluid)
-        speed = maximum(q, 0.0) / nozzle
-        force = sign * nozzle * (p_a - p_b + fluid.density((p_a + p_b) / 2) / 2 * speed * speed)
+        mass_flux = fluid.rho_0 * maximum(q, 0.0) / nozzle
+        force = sign * nozzle * (p_a - p_b + mass_flux * mass_flux / (2 * fluid.density((p_a + p_b) / 2)))
         return {"q_a": q, "q_b": -q, "f_rod": -force, "q": q, "area": area, "force": force}

@@ -1,42 +1,51 @@
 """Pressure valves by their static characteristics, with the lag of their poppets: no moving parts of their own.
 
-Each opens in proportion to what the pressures exceed its setting by, as a spring's stiffness makes it, and follows that
-opening with a lag. Valves built of spool, spring and faces are circuits: `relief_valve_part.yaml` and its like.
+Each opens in proportion to what the pressures exceed its setting by, as a spring's stiffness makes it, and follows them
+with a lag. What the pressures ask for may lie beyond the stops, so that a poppet is thrown onto its seat the faster the
+more its spring outweighs them; there it rests until they lead it away. Valves built of spool, spring and faces are
+circuits: `relief_valve_part.yaml` and its like.
 """
 
 from typing import Any
 
-from pydantic import BaseModel, Field
+from pydantic import BaseModel, ConfigDict, Field
 
 from crescentlab.component import Component, Equations
-from crescentlab.domain import dissipates, held, observable, reads_pressure, state, takes_pressure
+from crescentlab.domain import Held, dissipates, held, observable, reads_pressure, state, takes_pressure
 from crescentlab.fluid import Fluid
 from crescentlab.maths import Expr, maximum, pi
 from crescentlab.units import Flow, Frequency, Pressure, Ratio, Time
 
-from .valve_laws import Metering, clipped, follower
+from .valve_laws import Metering, follower, lagging
 
 
 class Lagging(BaseModel):
-    """First-order lag of a valve behind the opening that its pressures ask for."""
+    """First-order lag of a valve's moving part behind the position that the forces on it ask for."""
 
-    time_constant: Time = Field(default=5e-3, gt=0, description="lag of the opening behind the pressures")
+    model_config = ConfigDict(ignored_types=(Held,))
 
-    def lag(self, target: Any, lift: Any) -> Any:
-        """Rate [1/s] at which `lift` goes to its `target` [-]."""
-        return (target - lift) / self.time_constant
+    time_constant: Time = Field(
+        default=5e-3, gt=0, description="lag of the moving part behind the pressures: its damping over its stiffness"
+    )
+
+    at = held(Ratio, "-1 rests on the low stop, 1 on the high one, 0 free; -2 until the start is looked at", start=-2.0)
+
+    def lag(self, name: str, position: Any, at: Any, target: Any, low: Any = 0.0) -> dict[str, Any]:
+        """Derivative and events of the state `name`, led to its `target` [-] between `low` and 1."""
+        return lagging(name, position, at, target, self.time_constant, low)
 
 
 class ReliefValve(Lagging, Metering, Component):
     r"""Relief valve: static characteristic with a first-order lag.
 
-    .. math:: q = C_d\, s A \sqrt{2|\Delta p|/\rho}\, \mathrm{sign}\,\Delta p, \quad
-              T \frac{ds}{dt} = \min(\max((\Delta p - p_c)/p_r, 0), 1) - s
+    .. math:: q = C_d\, s A \sqrt{2\rho|\Delta p|}/\rho_0\, \mathrm{sign}\,\Delta p, \quad
+              T \frac{ds}{dt} = \frac{\Delta p - p_c}{p_r} - s, \quad 0 \le s \le 1
 
     \Delta p = p_a - p_b [Pa]; p_c = `cracking_pressure`, p_r = `opening_range` [Pa]; s = `lift` [-]; A = `area` [m^2];
     T = `time_constant` [s]; C_d [-] follows the flow number as in `orifice`; \rho [kg/m^3] at the mean pressure.
-    At rest it passes q at \Delta p = p_c + s p_r. Not for the valve's own oscillations
-    (`second_order_relief_valve`), nor for flow forces, which `opening_range` may contain.
+    At rest it passes q at \Delta p = p_c + s p_r. The poppet rests on its seat, and on its stop at s = 1, until the
+    pressure leads it away. Not for the valve's own oscillations (`second_order_relief_valve`, whose limit of much
+    damping this is, T = 2 \zeta/\omega), nor for flow forces, which `opening_range` may contain.
     Source: balance of forces on a poppet with a linear spring; lag after Rundo & Corvaglia (2016), section 4, without
     mass: T is damping over stiffness.
     """
@@ -50,16 +59,16 @@ class ReliefValve(Lagging, Metering, Component):
     q = observable(Flow, "flow from a to b")
     loss = dissipates()
 
-    def equations(self, p_a: Expr, p_b: Expr, lift: Expr, fluid: Fluid) -> Equations:
-        target = clipped((p_a - p_b - self.cracking_pressure) / self.opening_range)
+    def equations(self, p_a: Expr, p_b: Expr, lift: Expr, at: Expr, fluid: Fluid) -> Equations:
+        target = (p_a - p_b - self.cracking_pressure) / self.opening_range
         q = self.metered(p_a, p_b, lift, fluid)
-        return {"q_a": q, "q_b": -q, "q": q, "der_lift": self.lag(target, lift)}
+        return {"q_a": q, "q_b": -q, "q": q, **self.lag("lift", lift, at, target)}
 
 
 class SecondOrderReliefValve(Metering, Component):
     r"""Relief valve: static characteristic with the second-order motion of its poppet.
 
-    .. math:: q = C_d\, s A \sqrt{2|\Delta p|/\rho}\, \mathrm{sign}\,\Delta p, \quad
+    .. math:: q = C_d\, s A \sqrt{2\rho|\Delta p|}/\rho_0\, \mathrm{sign}\,\Delta p, \quad
               \frac{d^2 s}{dt^2} + 2 \zeta \omega \frac{ds}{dt} + \omega^2 s = \omega^2 \frac{\Delta p - p_c}{p_r},
               \quad 0 \le s \le 1
 
@@ -95,8 +104,8 @@ class SecondOrderReliefValve(Metering, Component):
 class ReducingValve(Lagging, Metering, Component):
     r"""Two-way pressure reducing valve: closes as its outlet reaches the set pressure.
 
-    .. math:: q = C_d\, s A \sqrt{2|\Delta p|/\rho}\, \mathrm{sign}\,\Delta p, \quad
-              T \frac{ds}{dt} = \min(\max((p_c - (p_b - p_d))/p_r, 0), 1) - s
+    .. math:: q = C_d\, s A \sqrt{2\rho|\Delta p|}/\rho_0\, \mathrm{sign}\,\Delta p, \quad
+              T \frac{ds}{dt} = \frac{p_c - (p_b - p_d)}{p_r} - s, \quad 0 \le s \le 1
 
     \Delta p = p_a - p_b [Pa]; p_b [Pa] the reduced pressure, p_d [Pa] that of the drain behind the spring; p_c =
     `set_pressure` at which it is closed, p_r = `closing_range` below which it is fully open [Pa]; s = `lift` [-];
@@ -115,23 +124,25 @@ class ReducingValve(Lagging, Metering, Component):
     q = observable(Flow, "flow from a to b")
     loss = dissipates()
 
-    def equations(self, p_a: Expr, p_b: Expr, p_drain: Expr, lift: Expr, fluid: Fluid) -> Equations:
-        target = clipped((self.set_pressure - (p_b - p_drain)) / self.closing_range)
+    def equations(self, p_a: Expr, p_b: Expr, p_drain: Expr, lift: Expr, at: Expr, fluid: Fluid) -> Equations:
+        target = (self.set_pressure - (p_b - p_drain)) / self.closing_range
         q = self.metered(p_a, p_b, lift, fluid)
-        return {"q_a": q, "q_b": -q, "q": q, "der_lift": self.lag(target, lift)}
+        return {"q_a": q, "q_b": -q, "q": q, **self.lag("lift", lift, at, target)}
 
 
 class ReducingRelievingValve(Lagging, Metering, Component):
     r"""Three-way pressure reducing valve: feeds its outlet below the set pressure, relieves it to the tank above.
 
-    .. math:: q_{in} = C_d \max(s, 0) A \sqrt{2|p_s - p_o|/\rho}, \quad
-              q_{out} = C_d \max(-s, 0) A \sqrt{2|p_o - p_t|/\rho}, \quad T \frac{ds}{dt} = s_0 - s
+    .. math:: q_{in} = C_d \max(s, 0) A \sqrt{2\rho|p_s - p_o|}/\rho_0, \quad
+              q_{out} = C_d \max(-s - u, 0) A \sqrt{2\rho|p_o - p_t|}/\rho_0, \quad
+              T \frac{ds}{dt} = \frac{p_c - (p_o - p_t)}{p_r} - s, \quad -1 - u \le s \le 1
 
-    s_0 = (p_c - (p_o - p_t))/p_r [-] within 0 and 1 below the set pressure p_c = `set_pressure`, (p_c + p_u -
-    (p_o - p_t))/p_r within -1 and 0 from p_u = `dead_band` above it, 0 between; p_s, p_o, p_t [Pa] of supply, outlet
-    and tank, flows of the sign of their drops; p_r = `closing_range` [Pa]; s = `stroke` [-]; A = `area` [m^2]; T =
-    `time_constant` [s]; C_d [-] follows the flow number as in `orifice`; \rho [kg/m^3] at the mean pressure. Not for
-    flow forces. Source: balance of forces on a spool with a linear spring; ISO 1219-1, three-way reducing valve.
+    p_s, p_o, p_t [Pa] of supply, outlet and tank, flows of the sign of their drops; p_c = `set_pressure` up to which it
+    feeds, p_r = `closing_range` [Pa] from shut to fully open on either side; s = `stroke` [-] of the spool in travels
+    from shut to fully open; u = p_u/p_r [-], p_u = `dead_band` [Pa], its overlap: it relieves from p_c + p_u on; A =
+    `area` [m^2]; T = `time_constant` [s]; C_d [-] follows the flow number as in `orifice`; \rho [kg/m^3] at the mean
+    pressure. The spool rests on either stop until the pressure leads it away. Not for flow forces.
+    Source: balance of forces on a spool with a linear spring; ISO 1219-1, three-way reducing valve.
     """
 
     set_pressure: Pressure = Field(gt=0, description="outlet pressure up to which the valve feeds")
@@ -141,32 +152,34 @@ class ReducingRelievingValve(Lagging, Metering, Component):
     supply = takes_pressure("inlet")
     outlet = takes_pressure("outlet, under the reduced pressure")
     tank = takes_pressure("where the outlet is relieved to, and the spring chamber drains")
-    stroke = state(Ratio, "1 fully open to the supply, -1 to the tank", start=0.0, nominal=1.0)
+    stroke = state(Ratio, "1 fully open to the supply, 0 shut, below -dead_band/closing_range open to the tank",
+                   start=0.0, nominal=1.0)  # fmt: skip
     q_in = observable(Flow, "flow from the supply to the outlet")
     q_out = observable(Flow, "flow from the outlet to the tank")
     loss = dissipates()
 
-    def equations(self, p_supply: Expr, p_outlet: Expr, p_tank: Expr, stroke: Expr, fluid: Fluid) -> Equations:
+    def equations(
+        self, p_supply: Expr, p_outlet: Expr, p_tank: Expr, stroke: Expr, at: Expr, fluid: Fluid
+    ) -> Equations:
+        overlap = self.dead_band / self.closing_range
         missing = self.set_pressure - (p_outlet - p_tank)
-        feeds = clipped(missing / self.closing_range)
-        relieves = clipped(-(missing + self.dead_band) / self.closing_range)
         into = self.metered(p_supply, p_outlet, maximum(stroke, 0.0), fluid)
-        out = self.metered(p_outlet, p_tank, maximum(-stroke, 0.0), fluid)
+        out = self.metered(p_outlet, p_tank, maximum(-stroke - overlap, 0.0), fluid)
         return {
             "q_supply": into,
             "q_outlet": out - into,
             "q_tank": -out,
             "q_in": into,
             "q_out": out,
-            "der_stroke": self.lag(feeds - relieves, stroke),
+            **self.lag("stroke", stroke, at, missing / self.closing_range, low=-1 - overlap),
         }
 
 
 class SequenceValve(Lagging, Metering, Component):
     r"""Sequence valve: passes fluid on once its inlet, or a pilot line, has reached the set pressure.
 
-    .. math:: q = C_d\, s A \sqrt{2|\Delta p|/\rho}\, \mathrm{sign}\,\Delta p, \quad
-              T \frac{ds}{dt} = \min(\max((p_x - p_d - p_c)/p_r, 0), 1) - s
+    .. math:: q = C_d\, s A \sqrt{2\rho|\Delta p|}/\rho_0\, \mathrm{sign}\,\Delta p, \quad
+              T \frac{ds}{dt} = \frac{p_x - p_d - p_c}{p_r} - s, \quad 0 \le s \le 1
 
     \Delta p = p_a - p_b [Pa]; p_x [Pa] of the pilot, which is joined to the inlet's net (internal pilot) or to another
     line (external); p_d [Pa] of the drain behind the spring, so that the outlet's pressure does not matter; p_c =
@@ -188,17 +201,19 @@ class SequenceValve(Lagging, Metering, Component):
     q = observable(Flow, "flow from a to b")
     loss = dissipates()
 
-    def equations(self, p_a: Expr, p_b: Expr, p_pilot: Expr, p_drain: Expr, lift: Expr, fluid: Fluid) -> Equations:
-        target = clipped((p_pilot - p_drain - self.set_pressure) / self.opening_range)
+    def equations(
+        self, p_a: Expr, p_b: Expr, p_pilot: Expr, p_drain: Expr, lift: Expr, at: Expr, fluid: Fluid
+    ) -> Equations:
+        target = (p_pilot - p_drain - self.set_pressure) / self.opening_range
         q = self.metered(p_a, p_b, lift, fluid)
-        return {"q_a": q, "q_b": -q, "q": q, "der_lift": self.lag(target, lift)}
+        return {"q_a": q, "q_b": -q, "q": q, **self.lag("lift", lift, at, target)}
 
 
 class CounterbalanceValve(Lagging, Metering, Component):
     r"""Counterbalance valve: holds a load until its own pressure and that of the pilot open it.
 
-    .. math:: q = C_d\, s A \sqrt{2|\Delta p|/\rho}\, \mathrm{sign}\,\Delta p, \quad
-              T \frac{ds}{dt} = \min(\max((p_a + R p_x - (1 + R) p_b - p_c)/p_r, 0), 1) - s
+    .. math:: q = C_d\, s A \sqrt{2\rho|\Delta p|}/\rho_0\, \mathrm{sign}\,\Delta p, \quad
+              T \frac{ds}{dt} = \frac{p_a + R p_x - (1 + R) p_b - p_c}{p_r} - s, \quad 0 \le s \le 1
 
     \Delta p = p_a - p_b [Pa]; p_a [Pa] of the load, p_b of the outlet, whose pressure acts on the spring's side: a
     vented valve has p_a + R p_x - p_c instead; p_x [Pa] of the pilot; R = `pilot_ratio` [-]; p_c = `set_pressure`, p_r
@@ -221,18 +236,18 @@ class CounterbalanceValve(Lagging, Metering, Component):
     q = observable(Flow, "flow from a to b")
     loss = dissipates()
 
-    def equations(self, p_a: Expr, p_b: Expr, p_pilot: Expr, lift: Expr, fluid: Fluid) -> Equations:
+    def equations(self, p_a: Expr, p_b: Expr, p_pilot: Expr, lift: Expr, at: Expr, fluid: Fluid) -> Equations:
         back = 0.0 if self.vented else (1 + self.pilot_ratio) * p_b
-        target = clipped((p_a + self.pilot_ratio * p_pilot - back - self.set_pressure) / self.opening_range)
+        target = (p_a + self.pilot_ratio * p_pilot - back - self.set_pressure) / self.opening_range
         q = self.metered(p_a, p_b, lift, fluid)
-        return {"q_a": q, "q_b": -q, "q": q, "der_lift": self.lag(target, lift)}
+        return {"q_a": q, "q_b": -q, "q": q, **self.lag("lift", lift, at, target)}
 
 
 class PressureCompensator(Lagging, Metering, Component):
     r"""Pressure compensator: keeps the drop over a metering edge behind it constant, whatever the load.
 
-    .. math:: q = C_d\, s A \sqrt{2|\Delta p|/\rho}\, \mathrm{sign}\,\Delta p, \quad
-              T \frac{ds}{dt} = \min(\max((p_c + p_r - (p_b - p_l))/p_r, 0), 1) - s
+    .. math:: q = C_d\, s A \sqrt{2\rho|\Delta p|}/\rho_0\, \mathrm{sign}\,\Delta p, \quad
+              T \frac{ds}{dt} = \frac{p_c + p_r - (p_b - p_l)}{p_r} - s, \quad 0 \le s \le 1
 
     \Delta p = p_a - p_b [Pa]; p_b - p_l [Pa] the drop over the metering edge between the outlet b and the load l; p_c =
     `control_pressure` at which it begins to close, p_r = `closing_range` [Pa] until it is closed; s = `lift` [-];
@@ -252,17 +267,17 @@ class PressureCompensator(Lagging, Metering, Component):
     q = observable(Flow, "flow from a to b")
     loss = dissipates()
 
-    def equations(self, p_a: Expr, p_b: Expr, p_load: Expr, lift: Expr, fluid: Fluid) -> Equations:
+    def equations(self, p_a: Expr, p_b: Expr, p_load: Expr, lift: Expr, at: Expr, fluid: Fluid) -> Equations:
         excess = p_b - p_load - self.control_pressure
         q = self.metered(p_a, p_b, lift, fluid)
-        return {"q_a": q, "q_b": -q, "q": q, "der_lift": self.lag(1 - clipped(excess / self.closing_range), lift)}
+        return {"q_a": q, "q_b": -q, "q": q, **self.lag("lift", lift, at, 1 - excess / self.closing_range)}
 
 
 class BypassCompensator(Lagging, Metering, Component):
     r"""Bypass compensator: keeps the drop over a metering edge constant by sending the surplus to the tank.
 
-    .. math:: q = C_d\, s A \sqrt{2|\Delta p|/\rho}\, \mathrm{sign}\,\Delta p, \quad
-              T \frac{ds}{dt} = \min(\max((p_a - p_l - p_c)/p_r, 0), 1) - s
+    .. math:: q = C_d\, s A \sqrt{2\rho|\Delta p|}/\rho_0\, \mathrm{sign}\,\Delta p, \quad
+              T \frac{ds}{dt} = \frac{p_a - p_l - p_c}{p_r} - s, \quad 0 \le s \le 1
 
     \Delta p = p_a - p_b [Pa]; p_a - p_l [Pa] the drop over the metering edge between the inlet a, at the pump, and the
     load l; p_c = `control_pressure` at which it begins to open, p_r = `opening_range` [Pa]; s = `lift` [-]; A = `area`
@@ -283,7 +298,7 @@ class BypassCompensator(Lagging, Metering, Component):
     q = observable(Flow, "flow from a to b")
     loss = dissipates()
 
-    def equations(self, p_a: Expr, p_b: Expr, p_load: Expr, lift: Expr, fluid: Fluid) -> Equations:
-        target = clipped((p_a - p_load - self.control_pressure) / self.opening_range)
+    def equations(self, p_a: Expr, p_b: Expr, p_load: Expr, lift: Expr, at: Expr, fluid: Fluid) -> Equations:
+        target = (p_a - p_load - self.control_pressure) / self.opening_range
         q = self.metered(p_a, p_b, lift, fluid)
-        return {"q_a": q, "q_b": -q, "q": q, "der_lift": self.lag(target, lift)}
+        return {"q_a": q, "q_b": -q, "q": q, **self.lag("lift", lift, at, target)}

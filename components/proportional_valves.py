@@ -10,7 +10,7 @@ from pydantic import Field
 from crescentlab.component import Component, Equations
 from crescentlab.domain import dissipates, observable, reads_pressure, state, takes_pressure, takes_signal
 from crescentlab.fluid import Fluid
-from crescentlab.maths import Expr, fabs, maximum, sqrt
+from crescentlab.maths import Expr, fabs, sqrt
 from crescentlab.units import Area, Flow, Pressure, Ratio
 
 from .pressure_valves import Lagging
@@ -20,10 +20,10 @@ from .valve_laws import Metering, clipped
 class ProportionalReliefValve(Lagging, Metering, Component):
     r"""Proportional relief valve: a signal sets its cracking pressure, as the current of a solenoid does.
 
-    .. math:: q = C_d\, s A \sqrt{2|\Delta p|/\rho}\, \mathrm{sign}\,\Delta p, \quad
-              T \frac{ds}{dt} = \min(\max((\Delta p - \max(p_c, 0))/p_r, 0), 1) - s
+    .. math:: q = C_d\, s A \sqrt{2\rho|\Delta p|}/\rho_0\, \mathrm{sign}\,\Delta p, \quad
+              T \frac{ds}{dt} = \frac{\Delta p - p_c}{p_r} - s, \quad 0 \le s \le 1
 
-    \Delta p = p_a - p_b [Pa]; p_c = `setting` [Pa], below 0 counted as 0; p_r = `opening_range` [Pa]; s = `lift` [-]; A
+    \Delta p = p_a - p_b [Pa]; p_c = `setting` [Pa], from 0 on; p_r = `opening_range` [Pa]; s = `lift` [-]; A
     = `area` [m^2]; T = `time_constant` [s]; C_d [-] follows the flow number as in `orifice`; \rho [kg/m^3] at the mean
     pressure. At rest it passes q at \Delta p = p_c + s p_r, as a `relief_valve` of that setting. Current against
     pressure, the highest setting and the lag of the solenoid stand before it: `table`, `limiter`,
@@ -35,23 +35,23 @@ class ProportionalReliefValve(Lagging, Metering, Component):
 
     a = takes_pressure("inlet")
     b = takes_pressure("outlet")
-    setting = takes_signal(Pressure, "drop at which the valve starts to open")
+    setting = takes_signal(Pressure, "drop at which the valve starts to open", low=0)
     lift = state(Ratio, "share of the full opening", start=0.0, nominal=1.0)
     q = observable(Flow, "flow from a to b")
     loss = dissipates()
 
-    def equations(self, p_a: Expr, p_b: Expr, setting: Expr, lift: Expr, fluid: Fluid) -> Equations:
-        target = clipped((p_a - p_b - maximum(setting, 0.0)) / self.opening_range)
+    def equations(self, p_a: Expr, p_b: Expr, setting: Expr, lift: Expr, at: Expr, fluid: Fluid) -> Equations:
+        target = (p_a - p_b - setting) / self.opening_range
         q = self.metered(p_a, p_b, lift, fluid)
-        return {"q_a": q, "q_b": -q, "q": q, "der_lift": self.lag(target, lift)}
+        return {"q_a": q, "q_b": -q, "q": q, **self.lag("lift", lift, at, target)}
 
 
 class FlowDivider(Lagging, Metering, Component):
     r"""Flow divider of spool type: shares its inlet out to two outlets in a set ratio, whatever their pressures.
 
-    .. math:: q_k = C_d \frac{A_k n_k}{\sqrt{1 + n_k^2}} \sqrt{\frac{2 |p - p_k|}{\rho}}\, \mathrm{sign}(p - p_k), \quad
+    .. math:: q_k = C_d \frac{A_k n_k}{\sqrt{1 + n_k^2}} \sqrt{2 \rho |p - p_k|}/\rho_0\, \mathrm{sign}(p - p_k), \quad
               d_k = \frac{n_k^2}{1 + n_k^2} (p - p_k), \quad
-              T \frac{dx}{dt} = \min(\max((d_a - d_b)/p_r, -1), 1) - x
+              T \frac{dx}{dt} = \frac{d_a - d_b}{p_r} - x, \quad -1 \le x \le 1
 
     k = a, b; p [Pa] of the inlet, p_k of the outlets; A_a = \sigma A, A_b = (1 - \sigma) A [m^2] of the two fixed
     metering edges, A = `area`, \sigma = `share` [-]; behind each an edge of the spool of n_k A_k: n_a = e (1 - x), n_b
@@ -82,7 +82,7 @@ class FlowDivider(Lagging, Metering, Component):
     drop_b = observable(Pressure, "drop over the metering edge of b")
     loss = dissipates()
 
-    def equations(self, p_inlet: Expr, p_a: Expr, p_b: Expr, stroke: Expr, fluid: Fluid) -> Equations:
+    def equations(self, p_inlet: Expr, p_a: Expr, p_b: Expr, stroke: Expr, at: Expr, fluid: Fluid) -> Equations:
         x = clipped(stroke, -1.0)
         to_a, drop_a = self._side(p_inlet, p_a, self.share, 1 - x, fluid)
         to_b, drop_b = self._side(p_inlet, p_b, 1 - self.share, 1 + x, fluid)
@@ -93,7 +93,7 @@ class FlowDivider(Lagging, Metering, Component):
             "q_b": -to_b,
             "drop_a": drop_a,
             "drop_b": drop_b,
-            "der_stroke": self.lag(clipped(uneven / self.centring_range, -1.0), stroke),
+            **self.lag("stroke", stroke, at, uneven / self.centring_range, low=-1.0),
         }
 
     def _side(self, p: Any, p_out: Any, share: Any, opened: Any, fluid: Fluid) -> tuple[Any, Any]:
@@ -106,8 +106,9 @@ class FlowDivider(Lagging, Metering, Component):
 class PriorityValve(Lagging, Metering, Component):
     r"""Priority valve: feeds its priority outlet first, what that does not need goes to the other one.
 
-    .. math:: q_{CF} = C_d (1 - s) A \sqrt{2|p - p_{CF}|/\rho}, \quad q_{EF} = C_d\, s A \sqrt{2|p - p_{EF}|/\rho},
-              \quad T \frac{ds}{dt} = \min(\max((p_{CF} - p_{LS} - p_c)/p_r, 0), 1) - s
+    .. math:: q_{CF} = C_d (1 - s) A \sqrt{2\rho|p - p_{CF}|}/\rho_0, \quad
+              q_{EF} = C_d\, s A \sqrt{2\rho|p - p_{EF}|}/\rho_0,
+              \quad T \frac{ds}{dt} = \frac{p_{CF} - p_{LS} - p_c}{p_r} - s, \quad 0 \le s \le 1
 
     p [Pa] of the inlet, p_CF of the priority outlet, p_EF of the surplus, p_LS at the load, flows of the sign of their
     drops; p_c = `control_pressure`, p_r = `control_range` [Pa]; s = `lift` [-]; A = `area` [m^2] of each fully open
@@ -130,9 +131,9 @@ class PriorityValve(Lagging, Metering, Component):
     loss = dissipates()
 
     def equations(
-        self, p_inlet: Expr, p_priority: Expr, p_surplus: Expr, p_load: Expr, lift: Expr, fluid: Fluid
+        self, p_inlet: Expr, p_priority: Expr, p_surplus: Expr, p_load: Expr, lift: Expr, at: Expr, fluid: Fluid
     ) -> Equations:
-        target = clipped((p_priority - p_load - self.control_pressure) / self.control_range)
+        target = (p_priority - p_load - self.control_pressure) / self.control_range
         first = self.metered(p_inlet, p_priority, 1 - lift, fluid)
         rest = self.metered(p_inlet, p_surplus, lift, fluid)
-        return {"q_inlet": first + rest, "q_priority": -first, "q_surplus": -rest, "der_lift": self.lag(target, lift)}
+        return {"q_inlet": first + rest, "q_priority": -first, "q_surplus": -rest, **self.lag("lift", lift, at, target)}

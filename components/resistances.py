@@ -8,7 +8,7 @@ from crescentlab.fluid import Fluid
 from crescentlab.maths import Expr
 from crescentlab.units import Density, Flow, FlowResistance, KinematicViscosity, Length, QuadraticResistance, Ratio
 
-from .flow_laws import pipe_friction_flow, rising_root, short_tube_flow
+from .flow_laws import pipe_friction_flow, referred_flow, rising_root, short_tube_flow
 
 
 class PipeResistance(Component):
@@ -46,14 +46,15 @@ class PipeResistance(Component):
 class ShortTube(Component):
     r"""Short tube with a sharp entry: an orifice at high, developing laminar flow at low Reynolds numbers.
 
-    .. math:: q = n C_d \frac{\pi d^2}{4} \sqrt{\frac{2|\Delta p|}{\rho}}\, \mathrm{sign}\,\Delta p, \quad
+    .. math:: q = n C_d \frac{\pi d^2}{4} \sqrt{2\rho|\Delta p|}/\rho_0\, \mathrm{sign}\,\Delta p, \quad
               C_d = \left(1.5 + 13.74 \sqrt{x}\right)^{-1/2} \ (x < \tfrac{1}{50}), \quad
               C_d = \left(2.28 + 64 x\right)^{-1/2} \ (x > \tfrac{1}{50}), \quad x = \frac{l}{d\, Re}
 
     \Delta p = p_a - p_b [Pa]; d = `diameter`, l = `length` [m]; Re = |v| d/\nu [-]; n = `parallel` [-] tubes side by
-    side; \rho [kg/m^3], \nu [m^2/s] at the mean pressure. The two formulas, 1.7 % apart where they meet, are joined
-    smoothly by the weight of Shah (1978), within 1.5 % of the one that holds. Drilled restrictors of one to some ten
-    diameters; not for turbulent flow in long tubes (`pipe_resistance`), sharp edges (`orifice`) or cavitating flow.
+    side; \rho [kg/m^3], \nu [m^2/s] at the mean pressure, \rho_0 at 0 bar gauge. The two formulas, 1.7 % apart where
+    they meet, are joined smoothly by the weight of Shah (1978), within 1.5 % of the one that holds. Drilled restrictors
+    of one to some ten diameters; not for turbulent flow in long tubes (`pipe_resistance`), sharp edges (`orifice`) or
+    cavitating flow.
     Source: H. E. Merritt, Hydraulic Control Systems (1967), chapter 3, after Shapiro, Siegel & Kline (1954); M. G.
     Rabie, Fluid Power Engineering (2009), Eqs. 2.40 and 2.41; R. K. Shah, J. Fluids Eng. 100 (1978) 177-179.
     """
@@ -75,13 +76,15 @@ class ShortTube(Component):
 class MeasuredResistance(Component):
     r"""Resistance known by its measured curve: a laminar part and a turbulent part, carried over to other oils.
 
-    .. math:: p_a - p_b = R\, \frac{\rho\nu}{\rho_r \nu_r}\, q + K \frac{\rho}{\rho_r}\, q |q|
+    .. math:: p_a - p_b = R\, \frac{\rho\nu}{\rho_r \nu_r}\, Q + K \frac{\rho}{\rho_r}\, Q |Q|, \quad
+              q = \frac{\rho}{\rho_0} Q
 
-    p [Pa] gauge; q [m^3/s] from a to b; R = `laminar` [Pa s/m^3], K = `turbulent` [Pa s^2/m^6], as measured with an oil
-    of \rho_r = `reference_density` [kg/m^3] and \nu_r = `reference_viscosity` [m^2/s]; \rho, \nu at the mean pressure.
-    Solved for the flow, q = 2 \Delta p/(r + sqrt(r^2 + 4 k|\Delta p|)) with r, k the two factors above. From two points
-    of a maker's curve, (q_1, p_1) and (q_2, p_2): K = (p_2/q_2 - p_1/q_1)/(q_2 - q_1), R = p_1/q_1 - K q_1. Not for
-    curves of another shape. Source: Poiseuille's law and Bernoulli's quadratic loss in series (Forchheimer, 1901).
+    p [Pa] gauge; Q [m^3/s] volume flow from a to b; R = `laminar` [Pa s/m^3], K = `turbulent` [Pa s^2/m^6], as measured
+    with an oil of \rho_r = `reference_density` [kg/m^3] and \nu_r = `reference_viscosity` [m^2/s]; \rho, \nu at the
+    mean pressure, \rho_0 at 0 bar gauge. Solved for the flow, Q = 2 \Delta p/(r + sqrt(r^2 + 4 k|\Delta p|)) with r, k
+    the two factors above. From two points of a maker's curve, (q_1, p_1) and (q_2, p_2): K = (p_2/q_2 - p_1/q_1)/(q_2 -
+    q_1), R = p_1/q_1 - K q_1. Not for curves of another shape. Source: Poiseuille's law and Bernoulli's quadratic loss
+    in series (Forchheimer, 1901).
     """
 
     laminar: FlowResistance = Field(gt=0, description="drop over flow at small flows, with the reference oil")
@@ -98,5 +101,6 @@ class MeasuredResistance(Component):
         mean = (p_a + p_b) / 2
         heavier = fluid.density(mean) / self.reference_density
         thicker = heavier * fluid.kinematic_viscosity(mean) / self.reference_viscosity
-        q = rising_root(p_a - p_b, thicker * self.laminar, heavier * self.turbulent)
+        volume_flow = rising_root(p_a - p_b, thicker * self.laminar, heavier * self.turbulent)
+        q = referred_flow(volume_flow, mean, fluid)
         return {"q_a": q, "q_b": -q, "q": q}

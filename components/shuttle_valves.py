@@ -14,13 +14,14 @@ from .valve_laws import Metering
 class ShuttleValve(Metering, Component):
     r"""Shuttle valve: the higher of two pressures reaches the common port, the other is shut off by the ball.
 
-    .. math:: q = C_d A \sqrt{2|p_k - p_o|/\rho}\, \mathrm{sign}(p_k - p_o), \quad
+    .. math:: q = C_d A \sqrt{2\rho|p_k - p_o|}/\rho_0\, \mathrm{sign}(p_k - p_o), \quad
               k = a \to b \text{ as } p_b - p_a > p_w, \quad k = b \to a \text{ as } p_a - p_b > p_w
 
     p_a, p_b, p_o [Pa] of the two inlets and the outlet; p_w = `switching_pressure` [Pa], within which the ball stays
-    where it is; A = `area` [m^2]; C_d [-] follows the flow number as in `orifice`; \rho [kg/m^3] at the mean pressure.
-    The ball moves at once, by an event; it starts on the seat of b. Not for the flow from inlet to inlet while the ball
-    moves, nor for leakage. Source: ISO 1219-1, shuttle valve; Rundo & Corvaglia (2016), Eqs. 27-29 for the flow.
+    where it is; A = `area` [m^2]; C_d [-] follows the flow number as in `orifice`; \rho [kg/m^3] at the mean pressure,
+    \rho_0 at 0 bar gauge. The ball moves at once, by an event; it starts on the seat of b. Not for the flow from inlet
+    to inlet while the ball moves, nor for leakage. Source: ISO 1219-1, shuttle valve; Rundo & Corvaglia (2016), Eqs.
+    27-29 for the flow.
     """
 
     switching_pressure: Pressure = Field(default=0.1e5, gt=0, description="difference that moves the ball")

@@ -86,7 +86,7 @@ def extended(what: str, times: Any, beyond: Beyond, stop: float) -> list[str]:
 
 
 class Table(Component):
-    r"""Tabulated function of a signal, piecewise linear or a spline, continued with the end slopes unless told otherwise.
+    r"""Tabulated function of a signal, piecewise linear or a spline, continued with the end slopes by default.
 
     .. math:: y = y_k + (y_{k+1} - y_k) \frac{u - u_k}{u_{k+1} - u_k}
 

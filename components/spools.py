@@ -17,17 +17,17 @@ from .valve_laws import SpoolEdge, Uncovered, limited, opening
 class AnnularPort(SpoolEdge, Component):
     r"""Annular port that the edge of a spool uncovers over its whole circumference.
 
-    .. math:: q = C_d A \sqrt{2|\Delta p|/\rho}\, \mathrm{sign}\,\Delta p, \quad A = \pi d h, \quad
-              F_{jet} = k \rho |q| v_{jet} \cos\vartheta, \quad F_t = L \rho \frac{q}{A} \frac{dA}{dx} v
+    .. math:: q = C_d A \sqrt{2\rho|\Delta p|}/\rho_0\, \mathrm{sign}\,\Delta p, \quad A = \pi d h, \quad
+              F_{jet} = k \rho_0 |q| v_{jet} \cos\vartheta, \quad F_t = L \rho_0 \frac{q}{A} \frac{dA}{dx} v
 
     \Delta p = p_a - p_b [Pa]; d = `diameter` [m]; h = \pm x - `overlap` [m], x [m], + for `opens` up; C_d [-] follows
     the flow number as in `orifice`, with the hydraulic diameter 2 h; v_jet = \sqrt{2|\Delta p|/\rho} [m/s]; \rho
-    [kg/m^3], \nu [m^2/s] at the mean pressure; k = `jet_coefficient` [-]. F_jet [N] closes whichever way the fluid
-    flows. \vartheta = `jet_angle` [rad]: 69 deg for an opening much wider than the clearance, falling to 21 deg for one
-    much smaller (von Mises). F_t [N] acts against v [m/s] of the rod where the fluid flows from a to b, L =
-    `damping_length` [m] of the fluid that the edge speeds up on side a (the spool's chamber is there: the edge meters
-    out); with the chamber on side b L is negative and F_t is with the motion. The part of F_t with dp/dt is left out.
-    Not for leakage at overlap (`leakage_land` beside it), nor for cavitating flow.
+    [kg/m^3], \nu [m^2/s] at the mean pressure, \rho_0 at 0 bar gauge; k = `jet_coefficient` [-]. F_jet [N] closes
+    whichever way the fluid flows. \vartheta = `jet_angle` [rad]: 69 deg for an opening much wider than the clearance,
+    falling to 21 deg for one much smaller (von Mises). F_t [N] acts against v [m/s] of the rod where the fluid flows
+    from a to b, L = `damping_length` [m] of the fluid that the edge speeds up on side a (the spool's chamber is there:
+    the edge meters out); with the chamber on side b L is negative and F_t is with the motion. The part of F_t with
+    dp/dt is left out. Not for leakage at overlap (`leakage_land` beside it), nor for cavitating flow.
     Source: H. E. Merritt, Hydraulic Control Systems (1967), chapter 5, flow forces on spool valves.
     """
 
@@ -51,7 +51,7 @@ class AnnularPort(SpoolEdge, Component):
 class RectangularSlots(SpoolEdge, Component):
     r"""Rectangular slots that the edge of a spool uncovers.
 
-    .. math:: q = C_d A \sqrt{2|\Delta p|/\rho}\, \mathrm{sign}\,\Delta p, \quad A = n b h, \quad
+    .. math:: q = C_d A \sqrt{2\rho|\Delta p|}/\rho_0\, \mathrm{sign}\,\Delta p, \quad A = n b h, \quad
               d_h = \frac{2 b h}{b + h}
 
     \Delta p = p_a - p_b [Pa]; n = `number`; b = `width` [m] along the circumference; h = \pm x - `overlap` [m], at most
@@ -83,8 +83,8 @@ class RectangularSlots(SpoolEdge, Component):
 class TriangularNotches(SpoolEdge, Component):
     r"""Triangular notches in the edge of a spool, which open softly.
 
-    .. math:: q = C_d A \sqrt{2|\Delta p|/\rho}\, \mathrm{sign}\,\Delta p, \quad A = n h^2 \tan\frac{\varphi}{2}, \quad
-              d_h = \frac{2 h \sin(\varphi/2)}{1 + \sin(\varphi/2)}
+    .. math:: q = C_d A \sqrt{2\rho|\Delta p|}/\rho_0\, \mathrm{sign}\,\Delta p, \quad
+              A = n h^2 \tan\frac{\varphi}{2}, \quad d_h = \frac{2 h \sin(\varphi/2)}{1 + \sin(\varphi/2)}
 
     \Delta p = p_a - p_b [Pa]; n = `number`; \varphi = `angle` [rad] of the tip; h = \pm x - `overlap` [m], at most
     `length`, x [m], + for `opens` up; \rho [kg/m^3]; discharge coefficient, flow forces [N] and all else as in

@@ -118,9 +118,9 @@ def read_csv(path: Path) -> Surface:
     columns = [table.numbers(name, quantity) for name, quantity in zip(names, quantities, strict=True)]
     points: dict[tuple[float, float], float] = {}
     for place, (x, y, z) in zip(table.places, np.transpose(columns).tolist(), strict=True):
-        for name, value in zip(names, (x, y, z), strict=True):
+        for k, value in enumerate((x, y, z)):
             if math.isnan(value):
-                raise InputError(f"the cell in the column {name!r} is empty", place)
+                raise file.empty(k, place)
         if (x, y) in points:
             raise InputError("this pair of x and y stands in an earlier line already; leave one of them out", place)
         points[x, y] = z

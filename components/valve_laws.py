@@ -9,7 +9,7 @@ from typing import Any, Literal
 from pydantic import BaseModel, Field
 
 from crescentlab.fluid import Fluid
-from crescentlab.maths import cos, hypot, maximum, minimum, pi, sqrt, when, where
+from crescentlab.maths import cos, hypot, maximum, minimum, not_, pi, sqrt, when, where
 from crescentlab.units import Angle, Area, Length, Pressure, Ratio
 
 from .flow_laws import DIAMETER_ROUNDING, hydraulic_diameter_of, orifice_flow
@@ -48,15 +48,17 @@ class Jet(BaseModel):
     def jet(self, p_a: Any, p_b: Any, area: Any, hydraulic_diameter: Any, cosine: Any, fluid: Fluid) -> "Issue":
         r"""What passes an edge, and the momentum of the jet along the axis.
 
-        .. math:: q = C_d A v_{jet}, \quad F = k \rho |q| v_{jet} \cos\vartheta, \quad v_{jet} = \sqrt{2|\Delta p|/\rho}
+        .. math:: \rho_0 q = \rho\, C_d A v_{jet}, \quad F = k \rho_0 |q| v_{jet} \cos\vartheta, \quad
+                  v_{jet} = \sqrt{2|\Delta p|/\rho}
 
-        A = `area` [m^2]; `cosine` = cos \vartheta [-] of the jet's angle to the axis; k = `jet_coefficient` [-].
+        \rho_0 q [kg/s] the mass flow; A = `area` [m^2]; `cosine` = cos \vartheta [-] of the jet's angle to the axis; k
+        = `jet_coefficient` [-].
         """
-        rho = fluid.density((p_a + p_b) / 2)
-        speed = orifice_flow(p_a, p_b, 1.0, hydraulic_diameter, self.cd_max, self.lambda_c, fluid)
-        q, rounded = area * speed, hypot(p_a - p_b, self.drop_rounding)
-        jet_velocity = (p_a - p_b) * sqrt(2 / (rho * rounded))
-        return Issue(q, self.jet_coefficient * rho * q * jet_velocity * cosine, rho * speed)
+        through_unit = orifice_flow(p_a, p_b, 1.0, hydraulic_diameter, self.cd_max, self.lambda_c, fluid)
+        q, rounded = area * through_unit, hypot(p_a - p_b, self.drop_rounding)
+        jet_velocity = (p_a - p_b) * sqrt(2 / (fluid.density((p_a + p_b) / 2) * rounded))
+        force = self.jet_coefficient * fluid.rho_0 * q * jet_velocity * cosine
+        return Issue(q, force, fluid.rho_0 * through_unit)
 
 
 @dataclass(frozen=True)
@@ -108,9 +110,10 @@ class SpoolEdge(Jet):
     def issued(self, uncovered: Uncovered, p_a: Any, p_b: Any, v_rod: Any, fluid: Fluid) -> dict[str, Any]:
         r"""What every edge returns, from what it has uncovered.
 
-        .. math:: F_t = L \rho \frac{q}{A} \frac{dA}{dx} v
+        .. math:: F_t = L \rho_0 \frac{q}{A} \frac{dA}{dx} v
 
-        F_t [N] the transient flow force; L = `damping_length` [m]; v = `v_rod` [m/s]; q/A goes on where A is 0.
+        F_t [N] the transient flow force; \rho_0 q [kg/s] the mass flow; L = `damping_length` [m]; v = `v_rod` [m/s];
+        q/A goes on where A is 0.
         """
         issue = self.jet(p_a, p_b, uncovered.area, uncovered.hydraulic_diameter, cos(self.jet_angle), fluid)
         transient = self.damping_length * issue.mass_flux * uncovered.slope * v_rod
@@ -150,7 +153,7 @@ def edge_share(stroke: Any, overlap: Any, rounding: Any) -> Any:
 
     u = `overlap`, w = `rounding` > 0, both as shares of the stroke; s is 1 at full stroke, x = 1.
     """
-    return _rounded(clipped(stroke, -1.0) - overlap, rounding) / (1 - overlap)
+    return _rounded(stroke - overlap, rounding) / (1 - overlap)
 
 
 def middle_share(stroke: Any, closed: Any, rounding: Any) -> Any:
@@ -161,8 +164,7 @@ def middle_share(stroke: Any, closed: Any, rounding: Any) -> Any:
     c = `closed`; both corners, in the middle and at c, are rounded within w = `rounding` > 0 as in :func:`edge_share`,
     which takes w/2 off the peak: s is 1 in the middle. All as shares of the stroke.
     """
-    x = clipped(stroke, -1.0)
-    away = _rounded(x, rounding) + _rounded(-x, rounding)
+    away = _rounded(stroke, rounding) + _rounded(-stroke, rounding)
     return _rounded(closed - away, rounding) / _rounded(closed - rounding / 2, rounding)
 
 
@@ -172,7 +174,7 @@ def _rounded(y: Any, w: Any) -> Any:
     return bend * bend / (4 * w) + maximum(y - w, 0.0)
 
 
-def clipped(value: Any, low: float = 0.0, high: Any = 1.0) -> Any:
+def clipped(value: Any, low: Any = 0.0, high: Any = 1.0) -> Any:
     """`value` within low and high."""
     return minimum(maximum(value, low), high)
 
@@ -196,4 +198,24 @@ def follower(
         "hits_low": when(free & (position < low), position=low, rate=0.0, at=-1.0),
         "hits_high": when(free & (position > 1.0), position=1.0, rate=0.0, at=1.0),
         "leaves": when((at == -1) & (target > low) | (at == 1) & (target < 1.0), at=0.0),
+    }
+
+
+def lagging(name: str, position: Any, at: Any, target: Any, time_constant: Any, low: Any = 0.0) -> dict[str, Any]:
+    r"""Derivative and events of the state `name`, at `position` [-], of a driven moving part without mass.
+
+    .. math:: T \frac{dx}{dt} = x_t - x, \quad x_{low} \le x \le 1
+
+    x_t = `target` [-], which may lie beyond the stops, where it pushes all the more; T = `time_constant` [s]. At a stop
+    it rests until the target leads away from it. at: -1 rests on the low stop, 1 on the high one, 0 free, -2 until the
+    start is looked at, which is put between the stops. Hitting and leaving a stop look at one relation from both sides,
+    so that no instant sees both.
+    """
+    free, above, below = at == 0, target > low, target < 1.0
+    return {
+        f"der_{name}": where(free, (target - position) / time_constant, 0.0),
+        "starts": when(at == -2, **{name: clipped(position, low)}, at=0.0),
+        "hits_low": when(free & (position < low) & not_(above), **{name: low}, at=-1.0),
+        "hits_high": when(free & (position > 1.0) & not_(below), **{name: 1.0}, at=1.0),
+        "leaves": when((at == -1) & above | (at == 1) & below, at=0.0),
     }

@@ -18,7 +18,7 @@ from crescentlab.fluid import Fluid
 from crescentlab.maths import Expr, acos, maximum, minimum, pi, sqrt
 from crescentlab.units import Area, Flow, FlowResistance, Force, Length, Pressure, QuadraticResistance, Ratio
 
-from .flow_laws import annular_flow, drag_flow
+from .flow_laws import annular_flow, drag_flow, referred_flow
 from .valve_laws import SpoolEdge, Uncovered
 
 Side = Literal["pushes_up", "pushes_down"]
@@ -104,7 +104,7 @@ class SpoolEnd(Component):
     def equations(self, p_port: Expr, v_rod: Expr, fluid: Fluid) -> Equations:
         area = _up(self.side) * pi / 4 * (self.diameter**2 - self.rod_diameter**2)
         force = p_port * area
-        return {"q_port": fluid.density(p_port) / fluid.rho_0 * area * v_rod, "f_rod": -force, "force": force}
+        return {"q_port": referred_flow(area * v_rod, p_port, fluid), "f_rod": -force, "force": force}
 
 
 class SpringChamberEnd(Component):
@@ -131,23 +131,24 @@ class SpringChamberEnd(Component):
     def equations(self, pressure: Expr, p_port: Expr, v_rod: Expr, fluid: Fluid) -> Equations:
         area = _up(self.side) * pi / 4 * self.diameter**2
         force = pressure * area
-        return {"q_port": fluid.density(p_port) / fluid.rho_0 * area * v_rod, "f_rod": -force, "force": force}
+        return {"q_port": referred_flow(area * v_rod, p_port, fluid), "f_rod": -force, "force": force}
 
 
 class RoundHoles(SpoolEdge, Component):
     r"""Round holes uncovered by the edge of a spool, with its steady and transient flow forces.
 
-    .. math:: q = n C_d A \sqrt{2|\Delta p|/\rho}\, \mathrm{sign}\,\Delta p, \quad
-              F_{jet} = k \rho |q| v_{jet} \cos\vartheta, \quad v_{jet} = \sqrt{2|\Delta p|/\rho}, \quad
-              F_t = L \rho \frac{q}{A} \frac{dA}{dx} v, \quad \frac{dA}{dx} = 2 \sqrt{h (d - h)}
+    .. math:: q = n C_d A \sqrt{2\rho|\Delta p|}/\rho_0\, \mathrm{sign}\,\Delta p, \quad
+              F_{jet} = k \rho_0 |q| v_{jet} \cos\vartheta, \quad v_{jet} = \sqrt{2|\Delta p|/\rho}, \quad
+              F_t = L \rho_0 \frac{q}{A} \frac{dA}{dx} v, \quad \frac{dA}{dx} = 2 \sqrt{h (d - h)}
 
-    \Delta p = p_a - p_b [Pa]; n = `number`; A [m^2] the segment of one hole of d = `diameter` [m] uncovered up to
-    h = \pm x - `overlap` [m], x [m], + for `opens` up; C_d(\lambda) = `cd_max` tanh(2\lambda/`lambda_c`) with the
-    hydraulic diameter 4 A/perimeter of one segment [m]; \rho [kg/m^3], \nu [m^2/s] at the mean pressure; \vartheta =
-    `jet_angle` [rad] to the spool's axis; k = `jet_coefficient` [-]. F_jet [N] closes whichever way the fluid flows;
-    v_jet is rounded within `drop_rounding` [Pa] of zero drop. F_t [N] acts against v [m/s] of the rod where the fluid
-    flows from a to b, L = `damping_length` [m] as in `annular_port`; its part with dp/dt is left out. Closed for h <=
-    0; fully open, without F_t, for h >= d. Not for cavitating flow, nor for an axial inlet's momentum (lower k).
+    \Delta p = p_a - p_b [Pa]; n = `number`; A [m^2] the segment of one hole of d = `diameter` [m] uncovered up to h =
+    \pm x - `overlap` [m], x [m], + for `opens` up; C_d(\lambda) = `cd_max` tanh(2\lambda/`lambda_c`) with the hydraulic
+    diameter 4 A/perimeter of one segment [m]; \rho [kg/m^3], \nu [m^2/s] at the mean pressure, \rho_0 at 0 bar gauge;
+    \vartheta = `jet_angle` [rad] to the spool's axis; k = `jet_coefficient` [-]. F_jet [N] closes whichever way the
+    fluid flows; v_jet is rounded within `drop_rounding` [Pa] of zero drop. F_t [N] acts against v [m/s] of the rod
+    where the fluid flows from a to b, L = `damping_length` [m] as in `annular_port`; its part with dp/dt is left out.
+    Closed for h <= 0; fully open, without F_t, for h >= d. Not for cavitating flow, nor for an axial inlet's momentum
+    (lower k).
     Source: Rundo & Corvaglia (2016), Eqs. 27-29 and 31; H. E. Merritt, Hydraulic Control Systems (1967), chapter 5,
     flow forces on spool valves.
     """
@@ -178,14 +179,15 @@ class RoundHoles(SpoolEdge, Component):
 class LeakageLand(Component):
     r"""Leakage along a spool's land and the viscous drag on it; the overlap changes with the stroke.
 
-    .. math:: q = \frac{\pi d c^3 (1 + 1.5\varepsilon^2)}{12 \mu l} \Delta p + \frac{\pi d c}{2} v, \quad
+    .. math:: q = \frac{\rho}{\rho_0} \left(\frac{\pi d c^3 (1 + 1.5\varepsilon^2)}{12 \mu l} \Delta p
+              + \frac{\pi d c}{2} v\right), \quad
               F = \frac{\pi d \mu l}{c} v - \frac{\pi d c}{2} \Delta p, \quad l = l_0 \pm x
 
     \Delta p = p_a - p_b [Pa]; q [m^3/s] from a to b, which lies towards increasing x; F [N] on the spool towards
     decreasing x; d = `diameter`, c = `clearance` (radial), l_0 = `overlap` at x = 0 [m], l not below `shortest`;
-    \varepsilon = `eccentricity`; \mu [Pa s] at the mean pressure; v [m/s]. The drag is that of a centred spool.
-    Not for a land that has opened: put holes or an orifice beside it. Source: Rundo & Corvaglia (2016), Eq. 23;
-    plane Couette-Poiseuille flow wrapped round the spool.
+    \varepsilon = `eccentricity`; \mu [Pa s], \rho [kg/m^3] at the mean pressure, \rho_0 at 0 bar gauge; v [m/s]. The
+    drag is that of a centred spool. Not for a land that has opened: put holes or an orifice beside it. Source: Rundo &
+    Corvaglia (2016), Eq. 23; plane Couette-Poiseuille flow wrapped round the spool.
     """
 
     diameter: Length = Field(gt=0, description="diameter of the land")
@@ -207,7 +209,7 @@ class LeakageLand(Component):
         length = maximum(self.overlap + growth * x_rod, self.shortest)
         width = pi * self.diameter
         q = annular_flow(p_a, p_b, self.diameter, self.clearance, self.eccentricity, length, fluid)
-        q = q + drag_flow(v_rod, width, self.clearance)
+        q = q + drag_flow(p_a, p_b, v_rod, width, self.clearance, fluid)
         shear = fluid.dynamic_viscosity((p_a + p_b) / 2) * length * v_rod / self.clearance
         drag = width * (shear - self.clearance / 2 * (p_a - p_b))
         return {"q_a": q, "q_b": -q, "f_rod": drag, "q": q, "length": length}
@@ -218,14 +220,15 @@ class SpringChamberPressure(Component):
 
     .. math:: p_c = a Q + b Q^2 \text{ for } Q > 0, \quad p_c = 0 \text{ otherwise}
 
-    p_c [Pa, gauge]; Q [m^3/s]; a = `linear` [Pa s/m^3]; b = `quadratic` [Pa s^2/m^6]. Not a resistance: no fluid
-    passes here. Source: Rundo & Corvaglia (2016), section 4.2 and Fig. 14.
+    p_c [Pa, gauge]; Q [m^3/s] volume flow at 0 bar gauge, behind the valve: the flow that a `round_holes` signals, mass
+    flow over \rho_0; a = `linear` [Pa s/m^3]; b = `quadratic` [Pa s^2/m^6]. Not a resistance: no fluid passes here.
+    Source: Rundo & Corvaglia (2016), section 4.2 and Fig. 14.
     """
 
     linear: FlowResistance = Field(default=0.0, ge=0, description="pressure per flow")
     quadratic: QuadraticResistance = Field(default=0.0, ge=0, description="pressure per flow squared")
 
-    flow = takes_signal(Flow, "flow through the valve")
+    flow = takes_signal(Flow, "flow through the valve, as volume at 0 bar gauge")
     pressure = gives_signal(Pressure, "gauge pressure in the chamber")
 
     def equations(self, flow: Expr) -> Equations:

@@ -61,7 +61,7 @@ class Plan:
 
 def plan(graph: Graph, library: Library, *, allow_open: bool = False) -> Plan:
     """Decide the causality; raises :class:`CausalityError` in the user's words."""
-    components = _forms(graph, allow_open)
+    components = _forms(graph)
     givers = {net.name: _giver(graph, net, components, allow_open) for net in graph.nets}
     fluids = _fluids(graph, components, library)
     traces = _traces(graph.design, components, fluids)
@@ -79,7 +79,7 @@ def _role(components: dict[str, Component], member: Member) -> str:
 # -- forms of flexible components ----------------------------------------------------------------
 
 
-def _forms(graph: Graph, allow_open: bool) -> dict[str, Component]:
+def _forms(graph: Graph) -> dict[str, Component]:
     components = {name: i.component for name, i in graph.design.instances.items()}
     flexible = [name for name, c in components.items() if type(c).family]
     if not flexible:
@@ -115,7 +115,7 @@ def _wanted(name: str, port: Port, gives: set[tuple[str, str, int]]) -> str:
 
 def _form(instance: Instance, wanted: dict[str, str]) -> Component:
     family = type(instance.component)
-    for form in family.forms():
+    for form in instance.forms:
         roles = {p.name: p.role for p in form.ports()}
         if all(roles[name] == role for name, role in wanted.items()):
             return form.model_construct(**{n: getattr(instance.component, n) for n in family.model_fields})

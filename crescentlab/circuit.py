@@ -6,26 +6,31 @@ trajectory -> result. A change of parameter values reuses the assembled system.
 
 from __future__ import annotations
 
+import importlib
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from dataclasses import replace
 from importlib import resources
 from pathlib import Path
 from typing import Any, get_args
 
+from crescentlab import arguments, cold_start
+from crescentlab.arguments import Settings
 from crescentlab.assembly import assemble
 from crescentlab.causality import Plan, plan
 from crescentlab.component import field_quantity
 from crescentlab.elaborate import Design, elaborate
-from crescentlab.errors import ExpressionError, InputError, SimulationError, UnitError, nearest
+from crescentlab.errors import ExpressionError, InputError, SimulationError, nearest
 from crescentlab.expressions import Value, evaluate, is_expression, number_of
 from crescentlab.fluid import Fluid
 from crescentlab.graph import build
 from crescentlab.library import Library, installed
 from crescentlab.netlist import SMALLEST_RTOL, Netlist, SimulationSection
 from crescentlab.plotting import check_plots
-from crescentlab.result import END, Result, read_series
+from crescentlab.recorded import Recorded, read
+from crescentlab.result import Result
 from crescentlab.solvers.options import Options
+from crescentlab.solvers.ranges import beyond_ranges
 from crescentlab.solvers.snapshot import Snapshot
 from crescentlab.system import System
 from crescentlab.trace import structure_of
@@ -35,6 +40,10 @@ Start = Result | Snapshot | str | Path
 """What a run can go on from: another run, where it stood, or its file."""
 SOLVERS: tuple[str, ...] = get_args(SimulationSection.model_fields["solver"].annotation)
 """Names of ``--solver`` and ``solver:``."""
+STEADY = "steady"
+"""The start that is an operating point."""
+OPERATING_POINT = "crescentlab.analysis.steady"
+"""Home of the search for it. It works on circuits, so that it stands above this module and is called by its name."""
 DESIGNS = 32
 """Designs kept: an analysis asks for the same one several times."""
 MAX_ROWS = 10_000_000
@@ -49,7 +58,7 @@ def shipped() -> dict[str, Path]:
 
 def find(name: str | Path) -> Path:
     """The file of a path or of a shipped circuit's name; raises :class:`InputError` offering the nearest."""
-    path = Path(name)
+    path = arguments.path(name, "circuit")
     if path.is_file():
         return path
     known = shipped()
@@ -71,12 +80,23 @@ class Circuit:
     """A circuit ready to be checked and simulated. Its files are read once: load it again to see them changed."""
 
     def __init__(self, netlist: Netlist, *, library: Library | None = None, no_code: bool = False) -> None:
+        arguments.instance(netlist, Netlist, "Circuit", "write crescentlab.load('relief_valve'), with your file's name")
         self.netlist = netlist
         self._library = library
         self.no_code = no_code
         self._systems: dict[Any, System] = {}
-        self._designs: dict[tuple[tuple[str, str], ...], Design] = {}
+        self._designs: dict[tuple[tuple[str, type, Any], ...], Design] = {}
         self.assembly_s = 0.0
+
+    def __repr__(self) -> str:
+        """Title, size, and how long it runs."""
+        sections = self.netlist.sections
+        title = sections.title if len(sections.title) <= 60 else f"{sections.title[:57]}..."
+        parts, more = list(sections.components), ", ..." if len(sections.components) > 8 else ""
+        return (
+            f"<Circuit {self.netlist.name!r} ({title}): {len(parts)} components: {', '.join(parts[:8])}{more}; "
+            f"{len(sections.nets)} nets, {len(sections.parameters)} parameters, stop {sections.simulation.stop:g} s>"
+        )
 
     @property
     def library(self) -> Library:
@@ -85,25 +105,26 @@ class Circuit:
             self._library = installed()
         return self._library
 
-    def design(self, parameters: Mapping[str, str] | None = None) -> Design:
-        """The flat circuit with numbers; ``parameters`` as for ``--set``. The latest few are kept."""
-        key = tuple((parameters or {}).items())
+    def design(self, parameters: Settings | None = None) -> Design:
+        """The flat circuit with numbers; ``parameters`` by the names of ``--set``. The latest few are kept."""
+        given = arguments.settings(parameters)
+        key = tuple((name, type(value), value) for name, value in given.items())
         found = self._designs.get(key)
         if found is None:
-            found = elaborate(self.netlist, self.library, parameters, no_code=self.no_code)
+            found = elaborate(self.netlist, self.library, given, no_code=self.no_code)
             for old in list(self._designs)[: 1 - DESIGNS]:
                 self._designs.pop(old, None)  # threads may share a circuit
             self._designs[key] = found
         return found
 
-    def plan(self, parameters: Mapping[str, str] | None = None, *, allow_open: bool = False) -> Plan:
+    def plan(self, parameters: Settings | None = None, *, allow_open: bool = False) -> Plan:
         """Its causality; raises an explained conflict. With ``allow_open`` a part's ports may be left open."""
         design = self.design(parameters)
         if allow_open and not design.fluids:
             design = replace(design, fluids=stand_in_fluids(design, self.library))
         return plan(build(design), self.library, allow_open=allow_open)
 
-    def system(self, parameters: Mapping[str, str] | None = None) -> System:
+    def system(self, parameters: Settings | None = None) -> System:
         """The assembled ODE, its start values tried."""
         design = self.design(parameters)
         system = self.assembled(design)
@@ -127,7 +148,7 @@ class Circuit:
         Raises :class:`InputError` if neither says it.
         """
         if given is not None:
-            return float(_time(given, "period", None))
+            return arguments.seconds(given, "period")
         text, place = self.netlist.sections.simulation.period, self.netlist.place("simulation", "period")
         if text is None:
             raise InputError(
@@ -136,7 +157,7 @@ class Circuit:
             )
         if not is_expression(text):
             try:
-                return float(_time(text, "period", None))
+                return arguments.seconds(text, "period")
             except InputError as error:
                 raise error.at(place) from None
         known = design.parameters[""]
@@ -148,41 +169,53 @@ class Circuit:
 
         try:
             seconds = number_of(evaluate(text, find), QUANTITIES["time"])
-            return float(_time(seconds, "period", None))
+            return arguments.seconds(seconds, "period")
         except InputError as error:
             raise InputError(f"period: {error.message.removeprefix('period: ')}", place) from None
 
     def simulate(
-        self, stop: str | float | None = None, parameters: Mapping[str, str | float] | None = None, *,
+        self, stop: str | float | None = None, parameters: Settings | None = None, *,
         solver: str | None = None, rtol: float | None = None, output_step: str | float | None = None,
         max_step: str | float | None = None, compile: bool | None = None, start: Start | None = None,
         progress: Callable[[float], None] | None = None, check: bool = True,
     ) -> Result:  # fmt: skip
         """Integrate the circuit; text needs units, floats are SI. ``compile`` as for ``--compile``.
 
-        With ``start``, a result or its file, the run goes on from its end, to the time ``stop``.
+        With ``start``, a result or its file, the run goes on from its end, to the time ``stop``; with
+        ``start="steady"`` it begins at the operating point, as with ``simulation: {start: steady}``.
 
         Raises :class:`InputError` for wrong input, and, with ``check``, :class:`SimulationError` if the run
         fails, its ``result`` attribute holding what was computed.
         """
-        design = self.design({k: _text(v) for k, v in (parameters or {}).items()})
+        design = self.design(parameters)
         system = self.assembled(design)
         section = self.netlist.sections.simulation
         options = Options(
-            stop=_time(stop, "stop", section.stop), rtol=section.rtol if rtol is None else rtol,
+            stop=_time(stop, "stop", section.stop),
+            rtol=section.rtol if rtol is None else arguments.number(rtol, "rtol", "1e-6"),
             solver=solver or section.solver, max_step=_time(max_step, "max_step", section.max_step),
             output_step=_time(output_step, "output_step", section.output_step),
             compile=section.compile if compile is None else compile,
         )  # fmt: skip
         check_options(options)
         values = system.values(design)
-        begin = None if start is None else snapshot_of(start, system)
+        start = section.start if start is None else start
+        warnings: list[str] = []
+        begin: Snapshot | None
+        if isinstance(start, str) and start == STEADY:
+            begin, warnings = self._at_rest(parameters)
+        else:
+            begin = None if start is None else snapshot_of(start, system)
         if begin is not None and not options.stop > begin.t:
             raise InputError(f"stop: the start is at {begin.t:g} s already; write an end time beyond it")
         from crescentlab.solvers.integrate import integrate  # a third of a second of SciPy that `check` does without
 
         trajectory = integrate(system, values, options, progress, begin)
+        trajectory.warnings[:0] = warnings
+        trajectory.warnings += beyond_ranges(system, values.p, trajectory.steps)
         result = Result(system, values if begin is None else begin.values(values), design, trajectory)
+        if trajectory.status == "failed" and begin is None:
+            trajectory.error += cold_start.advice(result, options.span)
         if check and trajectory.status == "failed":
             failure = SimulationError(trajectory.error)
             failure.result = result  # type: ignore[attr-defined]
@@ -191,22 +224,38 @@ class Circuit:
             raise KeyboardInterrupt(trajectory.error)
         return result
 
+    def _at_rest(self, parameters: Settings | None) -> tuple[Snapshot, list[str]]:
+        """The operating point at the time 0, and what is to be said of it."""
+        steady = importlib.import_module(OPERATING_POINT).steady
+        place = self.netlist.place("simulation", "start")
+        try:
+            point = steady(self, parameters, at=0.0)
+        except InputError as error:
+            raise error.at(place) from None
+        except SimulationError as error:
+            raise SimulationError(f"start: steady: {error}") from None
+        return point.snapshot, [f"start: {said}" for said in point.warnings]
+
+
+def check_circuit(circuit: Any, name: str) -> None:
+    """Refuse what is no circuit; raises :class:`InputError`."""
+    arguments.instance(circuit, Circuit, name, "write crescentlab.load('relief_valve') first, with your file's name")
+
 
 def snapshot_of(start: Start, system: System) -> Snapshot:
     """Where a result, or the run that a file holds, ended; raises :class:`InputError` if it cannot be gone on from."""
     if isinstance(start, Snapshot):
         return start
-    if isinstance(start, Result):
-        if start.trajectory.end is None:
-            raise InputError("start: this run failed, so there is no end to go on from")
-        return Snapshot.of_text(start.trajectory.end.as_text(start.system), system, "start")
-    attributes = read_series(Path(start))[3]
-    if END not in attributes:
-        kind = "a .csv file does not say" if Path(start).suffix == ".csv" else "it does not say"
-        raise InputError(
-            f"{start}: {kind} where its run ended; start from a .nc or .parquet file of a run that ended well"
-        )
-    return Snapshot.of_text(attributes[END], system, str(start))
+    result = start if isinstance(start, Result) else read(arguments.path(start, "start"))
+    source = str(result.path) if isinstance(result, Recorded) else "start"
+    if result.end is not None:
+        return Snapshot.of_text(result.end, system, source)
+    if not isinstance(result, Recorded):
+        raise InputError("start: this run failed, so there is no end to go on from")
+    kind = "a .csv file does not say" if result.path.suffix == ".csv" else "it does not say"
+    raise InputError(
+        f"{source}: {kind} where its run ended; start from a .nc or .parquet file of a run that ended well"
+    )
 
 
 def stand_in_fluids(design: Design, library: Library) -> dict[str, Fluid]:
@@ -231,26 +280,12 @@ def check_options(options: Options) -> None:
         raise InputError(
             f"rtol {options.rtol:g}: the relative tolerance lies between 0 and 1, from 1e-13 on; write for example 1e-6"
         )
-    if options.solver not in SOLVERS:
-        close = nearest(options.solver, SOLVERS, otherwise="none is called that")
-        raise InputError(f"solver {options.solver!r}: {close} ({', '.join(SOLVERS)})")
+    arguments.choice(options.solver, "solver", SOLVERS)
     if options.output_step is not None and options.stop / options.output_step > MAX_ROWS:
         raise InputError(f"output_step {options.output_step:g} s makes more than {MAX_ROWS} rows; write a longer one")
     if options.output_step is not None and options.output_step > options.span:
         raise InputError(f"output_step {options.output_step:g} s is longer than the run, {options.span:g} s")
 
 
-def _text(value: str | float) -> str:
-    return value if isinstance(value, str) else repr(value)
-
-
-def _time(value: str | float | None, name: str, default: Any) -> Any:
-    if value is None:
-        return default
-    try:
-        seconds = QUANTITIES["time"].parse(value) if isinstance(value, str) else float(value)
-    except UnitError as error:
-        raise InputError(f"{name}: {error.message}") from None
-    if not seconds > 0:
-        raise InputError(f"{name}: {value} must be above 0")
-    return seconds
+def _time(value: Any, name: str, default: Any) -> Any:
+    return default if value is None else arguments.seconds(value, name)

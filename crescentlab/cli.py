@@ -12,7 +12,7 @@ from collections.abc import Sequence
 from typing import NoReturn
 
 from crescentlab import __version__
-from crescentlab.errors import ComponentError, InputError, SimulationError, nearest
+from crescentlab.errors import ComponentError, CrescentlabError, InputError, nearest
 
 DONE, BUG, WRONG_INPUT, FAILED, INTERRUPTED = 0, 1, 2, 3, 130
 """Exit codes. FAILED is a simulation that could not go on; what it computed is saved."""
@@ -63,7 +63,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         return done.code if isinstance(done.code, int) else DONE if done.code is None else BUG
     except (InputError, ComponentError) as error:
         return _failed(arguments, str(error), WRONG_INPUT, "invalid")
-    except SimulationError as error:
+    except CrescentlabError as error:
         return _failed(arguments, str(error), FAILED, "failed")
     except KeyboardInterrupt as stop:
         return _failed(arguments, str(stop) or "interrupted", INTERRUPTED, "interrupted")

@@ -70,6 +70,8 @@ class Component(BaseModel):
     @classmethod
     def __pydantic_init_subclass__(cls, **kwargs: Any) -> None:
         _check_class(cls)
+        if any(port.ranged for port in cls.ports()) and not (cls.family or hasattr(cls.equations, "holds_ranges")):
+            cls.equations = _holding_ranges(cls.equations)
 
     lossless: ClassVar[bool] = False
     """Whether all the power that enters leaves at once, as through a lever, a pair of gears or a meter."""
@@ -94,8 +96,21 @@ class Component(BaseModel):
 
     @classmethod
     def forms(cls) -> list[type[Component]]:
-        """The causal forms of a family; for a plain class, itself."""
-        return [form for sub in cls.__subclasses__() for form in sub.forms()] if cls.family else [cls]
+        """The causal forms of a family, defined in its own module or package; for a plain class, itself.
+
+        What others derive from the family is theirs: see :meth:`crescentlab.library.Library.forms`.
+        """
+        if not cls.family:
+            return [cls]
+        return [form for sub in cls.__subclasses__() if _together(sub, cls) for form in sub.forms()]
+
+    @property
+    def unbalanced(self) -> str:
+        """Why its volumes do not follow its flows, so that the ledgers of a run with it cannot close; empty if they do.
+
+        A class whose simplification breaks the balance overrides it.
+        """
+        return ""
 
     @classmethod
     def asks_for(cls) -> list[str]:
@@ -147,6 +162,29 @@ class Component(BaseModel):
             value = start
         n = self.size_of(declared.size)
         return np.broadcast_to(np.asarray(value, dtype=float), (1 if n is None else n,)).copy()
+
+
+def _together(one: type, other: type) -> bool:
+    """Whether two classes are of one module, or of modules of one package."""
+    home, away = one.__module__, other.__module__
+    package = home.rpartition(".")[0]
+    return home == away or (bool(package) and package == away.rpartition(".")[0])
+
+
+def _holding_ranges(equations: Callable[..., Equations]) -> Callable[..., Equations]:
+    """The same equations; the signals they are given are held within the ranges that the ports declare."""
+    signature = inspect.signature(equations)
+
+    @functools.wraps(equations)
+    def held(self: Component, *args: Any, **kwargs: Any) -> Equations:
+        given = signature.bind(self, *args, **kwargs)
+        for port in self.ports():
+            if port.ranged and port.name in given.arguments:
+                given.arguments[port.name] = port.within(given.arguments[port.name])
+        return equations(*given.args, **given.kwargs)
+
+    held.holds_ranges = True  # type: ignore[attr-defined]
+    return held
 
 
 @functools.cache

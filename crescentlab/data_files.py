@@ -24,7 +24,7 @@ from pathlib import Path
 import numpy as np
 
 from crescentlab.errors import InputError, Place, nearest
-from crescentlab.units import QUANTITIES, Quantity, normalise, parse_any
+from crescentlab.units import COMMON, QUANTITIES, Quantity, nearest_unit, normalise, parse_any
 
 COMMENT = "#"
 BLOCK = 4_000_000
@@ -135,34 +135,49 @@ class DataFile:
             raise InputError(said + ("; decimals follow a point" if "," in cell else ""), place)
         return value
 
-    def numbers(self, first: int, lines: list[str], columns: Sequence[int]) -> np.ndarray:
-        """Numbers of some columns in a block of lines, shape (rows, columns).
+    def numbers(
+        self, first: int, lines: list[str], columns: Sequence[int]
+    ) -> tuple[np.ndarray, list[int], InputError | None]:
+        """Numbers of some columns in a block of lines up to the first that has none: (rows, columns), line numbers.
 
-        Raises :class:`InputError` with line and column for a cell that is empty or no finite number.
+        The third says what is wrong with that one, by line and column: an empty cell, or what is no finite number.
         """
-        kept = [line for line in lines if line.strip() and not line.lstrip().startswith(COMMENT)]
+        kept = [(n, line) for n, line in enumerate(lines, start=first) if _has_cells(line)]
         if not kept:
-            return np.zeros((0, len(columns)))
-        if all(line.count(self.separator) == self.width - 1 for line in kept):
-            plain = "\n".join(kept)
-            swapped = plain if self.separator == "," else plain.replace(",", ".")
+            return np.zeros((0, len(columns))), [], None
+        places = [n for n, _ in kept]
+        if all(line.count(self.separator) == self.width - 1 for _, line in kept):
             try:
                 made = np.loadtxt(
-                    swapped.split("\n"), delimiter=self.separator, usecols=columns, comments=COMMENT, ndmin=2,
-                    quotechar='"',
+                    [line if self.separator == "," else line.replace(",", ".") for _, line in kept],
+                    delimiter=self.separator, usecols=columns, comments=COMMENT, ndmin=2, quotechar='"',
                 )  # fmt: skip
                 if np.isfinite(made).all():
-                    return np.asarray(made)
+                    return made, places, None
             except ValueError:
                 pass  # told below, cell by cell
         found: list[list[float]] = []
-        for place, cells in self._cells(first, lines):
-            row = [self.number(cells[k], place, k) for k in columns]
-            for k, value in zip(columns, row, strict=True):
-                if math.isnan(value):
-                    raise InputError(f"the cell in the column {self.titles[k].name!r} is empty", place)
-            found.append(row)
-        return np.array(found).reshape(-1, len(columns))
+        places = []
+        fault: InputError | None = None
+        try:
+            for place, cells in self._cells(first, lines):
+                row = [self.number(cells[k], place, k) for k in columns]
+                for k, value in zip(columns, row, strict=True):
+                    if math.isnan(value):
+                        raise self.empty(k, place)
+                found.append(row)
+                places.append(place.line)
+        except InputError as error:
+            fault = error
+        return np.array(found).reshape(-1, len(columns)), places, fault
+
+    def empty(self, column: int, place: Place) -> InputError:
+        """What is said of a cell that must not be empty."""
+        return InputError(f"the cell in the column {self.titles[column].name!r} is empty", place)
+
+
+def _has_cells(line: str) -> bool:
+    return bool(line.strip()) and not line.lstrip().startswith(COMMENT)
 
 
 def open_data(path: Path, shown: str, asked: Place | None = None, *, beside: str = "circuit") -> DataFile:
@@ -228,8 +243,8 @@ def _title(title: str, top: Place) -> Title:
     if not name or (bracket and (not closed or after.strip())):
         raise InputError(f"the title {title!r} is not `name [unit]`, for example speed [rpm]", top)
     if unit and not any(normalise(unit) in q.units for q in QUANTITIES.values()):
-        known = [u for q in QUANTITIES.values() for u in q.units if u]
-        raise InputError(f"column {name!r}: unknown unit {unit!r}: {nearest(normalise(unit), known)}", top)
+        near = nearest_unit(normalise(unit), {u: 0 for q in QUANTITIES.values() for u in q.units})
+        raise InputError(f"column {name!r}: unknown unit {unit!r}: {near or f'units are {COMMON} and the like'}", top)
     return Title(name, unit)
 
 
@@ -317,57 +332,60 @@ def whole(file: DataFile) -> Table:
 
 
 class Recording:
-    """Some columns of a data file over the time, of which no more rows are read than have been asked for."""
+    """Some columns of a data file over the time, of which no more is read than has been asked for."""
 
     def __init__(self, file: DataFile, time: int, columns: Sequence[int]) -> None:
         self.file, self.columns = file, [time, *columns]
         self.factor, self.offset = file.scale(time, QUANTITIES["time"])
         self.begin, self.line = file.begin, file.line + 1
-        self.done = False
+        self.rows = np.zeros((0, len(self.columns)))
+        self.last = -math.inf
+        self.fault: InputError | None = None
+        """What is wrong with the row after the last one that could be read."""
+        self.ended = False
         self.reading = threading.Lock()
-        self.blocks: list[np.ndarray] = []
 
     def until(self, t: float) -> tuple[np.ndarray, np.ndarray]:
         """Times [s] (m,) and values in the columns' units (m, columns) up to the first row beyond ``t``.
 
-        Raises :class:`InputError` naming the row for a time that falls, and for whatever is no number.
+        Raises :class:`InputError` naming row and column for a time that falls, and for what is no number, unless it
+        stands behind that row.
         """
         with self.reading:  # runs may share it
-            rows = self._read(t)
+            if not self.last > t and not self.ended:
+                self._read(t)
+            rows = self.rows
+        if self.fault is not None and not self.last > t:
+            raise self.fault
+        if not rows.size:
+            raise _no_titles(self.file.top)
         stop = int(np.searchsorted(rows[:, 0], t, side="right")) + 1
         return rows[:stop, 0], rows[:stop, 1:]
 
-    def _read(self, t: float) -> np.ndarray:
-        last = self.blocks[-1][-1, 0] if self.blocks else -math.inf
-        while not self.done and not last > t:
-            for first, begin, lines in self.file.blocks(self.begin, self.line):
-                made = self.file.numbers(first, lines, self.columns)
-                self.begin, self.line = begin, first + len(lines)
-                if made.size:
-                    made[:, 0] = made[:, 0] * self.factor + self.offset
-                    self._check(first, lines, np.concatenate([[last], made[:, 0]]))
-                    self.blocks.append(made)
-                    last = made[-1, 0]
-                    if last > t:
-                        break
-            else:
-                self.done = True
-        if not self.blocks:
-            raise _no_titles(self.file.top)
-        if len(self.blocks) > 1:
-            self.blocks = [np.concatenate(self.blocks)]
-        return self.blocks[0]
+    def _read(self, t: float) -> None:
+        read = [self.rows]
+        for first, begin, lines in self.file.blocks(self.begin, self.line):
+            made, places, self.fault = self.file.numbers(first, lines, self.columns)
+            self.begin, self.line = begin, first + len(lines)
+            made[:, 0] = made[:, 0] * self.factor + self.offset
+            falls = np.flatnonzero(np.diff(made[:, 0], prepend=self.last) < 0)
+            if falls.size:
+                self.fault = self._falls(made[: falls[0] + 1, 0], places[falls[0]])
+                made = made[: falls[0]]
+            read.append(made)
+            self.last = float(made[-1, 0]) if made.size else self.last
+            if self.fault is not None or self.last > t:
+                break
+        else:
+            self.ended = True
+        self.ended = self.ended or self.fault is not None
+        self.rows = np.concatenate(read)
 
-    def _check(self, first: int, lines: list[str], times: np.ndarray) -> None:
-        falls = np.flatnonzero(np.diff(times) < 0)
-        if not falls.size:
-            return
-        k = int(falls[0])
-        place = [place for place, _ in self.file._cells(first, lines)][k]
-        seconds = QUANTITIES["time"]
+    def _falls(self, times: np.ndarray, line: int) -> InputError:
+        before = float(times[-2]) if times.size > 1 else self.last
+        shown = [QUANTITIES["time"].show(t, "s", 12) for t in (float(times[-1]), before)]
         said = f"the time falls back in the column {self.file.titles[self.columns[0]].name!r}"
-        before, after = (seconds.show(float(times[j]), "s", 10) for j in (k, k + 1))
-        raise InputError(f"{said}: {after} follows {before}; sort the rows", place)
+        return InputError(f"{said}: {shown[0]} follows {shown[1]}; sort the rows", Place(self.file.shown, line))
 
 
 @functools.lru_cache(maxsize=16)

@@ -13,9 +13,11 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from pydantic.fields import FieldInfo
 
+from crescentlab.arguments import Settings
 from crescentlab.component import Component, field_quantity, is_structural
-from crescentlab.domain import Held, Observable, Port, State
+from crescentlab.domain import HYDRAULIC, Held, Observable, Port, Scheduled, State
 from crescentlab.errors import ComponentError, ExpressionError, InputError, Place, UnitError, nearest
 from crescentlab.explain import validated
 from crescentlab.expressions import Value, evaluate, is_expression, number_of
@@ -23,10 +25,13 @@ from crescentlab.fluid import Fluid
 from crescentlab.library import Library
 from crescentlab.netlist import Netlist, NetSection, net_ports
 from crescentlab.units import QUANTITIES, Quantity, is_number, parse_any
+from crescentlab.unused import unused_parameters
 from crescentlab.yaml_text import Node
 
 MAX_SUBCIRCUIT_DEPTH = 20
 COMMAND = Place("--set", 0)
+START_PRESSURE = "start_pressure"
+"""Parameter of parts whose states are computed from it, such as lines."""
 
 
 @dataclass(frozen=True)
@@ -37,6 +42,10 @@ class Instance:
     component: Component
     place: Place | None
     start: dict[str, np.ndarray] = field(default_factory=dict)
+    forms: tuple[type[Component], ...] = ()
+    """Of a family, the causal forms that the library of its file has; of another class, itself."""
+    places: dict[str, Place | None] = field(default_factory=dict)
+    """Where each of its parameters was written."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -85,12 +94,12 @@ class Design:
     outputs: list[Output]
     parameters: dict[str, dict[str, Value]]
     """Parameter values per scope ('' is the circuit's own)."""
+    warnings: tuple[str, ...] = ()
+    """What the text has that will not do what its writer may think."""
 
 
-def elaborate(
-    netlist: Netlist, library: Library, settings: Mapping[str, str] | None = None, *, no_code: bool = False
-) -> Design:
-    """Flatten ``netlist``; ``settings`` are ``--set`` texts by dotted name.
+def elaborate(netlist: Netlist, library: Library, settings: Settings | None = None, *, no_code: bool = False) -> Design:
+    """Flatten ``netlist``; ``settings`` are ``--set`` texts, or numbers in SI, by dotted name.
 
     Raises :class:`InputError` with file and line for whatever in the files, or ``--set`` for whatever
     in the settings, cannot be used.
@@ -99,28 +108,30 @@ def elaborate(
     overrides = _Overrides(dict(settings or {}))
     library = work.with_user_files(netlist, library)
     fluids = work.fluids(netlist, library, overrides)
+    work.start_pressure = _start_pressure(netlist, overrides)
     work.scope(netlist, library, "", {}, overrides, (netlist.folder / netlist.name,))
     overrides.check_used()
-    return Design(netlist, work.instances, work.joined_nets(), fluids, work.outputs, work.parameters)
+    warnings = [said for each in (netlist, *work.parts.values()) for said in unused_parameters(each)]
+    return Design(netlist, work.instances, work.joined_nets(), fluids, work.outputs, work.parameters, tuple(warnings))
 
 
 class _Overrides:
-    """Texts given by ``--set``; each must be used by something."""
+    """Texts and numbers given by ``--set`` or from Python; each must be used by something."""
 
-    def __init__(self, texts: dict[str, str]) -> None:
-        self.texts = texts
+    def __init__(self, values: dict[str, Any]) -> None:
+        self.values = values
         self.used: set[str] = set()
         self.known: set[str] = set()
 
-    def take(self, name: str) -> str | None:
+    def take(self, name: str) -> Any:
         self.known.add(name)
-        if name in self.texts:
+        if name in self.values:
             self.used.add(name)
-            return self.texts[name]
+            return self.values[name]
         return None
 
     def check_used(self) -> None:
-        for name in self.texts:
+        for name in self.values:
             if name not in self.used:
                 raise InputError(f"--set {name}: nothing has this name: {nearest(name, self.known)}")
 
@@ -137,6 +148,8 @@ class _Elaboration:
         self.parameters: dict[str, dict[str, Value]] = {}
         self.parts: dict[str, Netlist] = {}
         self.made: dict[Any, Any] = {}
+        self.start_pressure: float | None = None
+        """Of parts that state none of their own [Pa]."""
 
     def with_user_files(self, netlist: Netlist, library: Library) -> Library:
         for k, text in enumerate(netlist.sections.library):
@@ -158,7 +171,9 @@ class _Elaboration:
             node = replace(netlist.node.find(path), place=netlist.place(*path))
             assert isinstance(node.value, dict)
             if "type" not in node.value:
-                raise InputError("the fluid needs a type, for example fluid: {type: simple_oil}", node.place)
+                raise InputError(
+                    "the fluid needs a type, for example fluid: {type: water, temperature: 20 degC}", node.place
+                )
             cls = library.fluid(str(node.value["type"].value), node.place_of("type"))
             made[name] = self.instance(cls, node, _scope_lookup(values, netlist), overrides, name, netlist.folder)
         return made
@@ -185,9 +200,7 @@ class _Elaboration:
                     netlist, section.type, node, full, values, library, overrides, chain
                 )
             else:
-                self.component(
-                    netlist, library.component(section.type, node.place_of("type")), node, full, values, overrides
-                )
+                self.component(netlist, library, section.type, node, full, values, overrides)
         for name, net in sections.nets.items():
             self.net(netlist, prefix, name, net, inner_ports)
         for name in sections.outputs:
@@ -201,20 +214,24 @@ class _Elaboration:
     def component(
         self,
         netlist: Netlist,
-        cls: type[Component],
+        library: Library,
+        kind: str,
         node: Node,
         full: str,
         values: dict[str, Value],
         overrides: _Overrides,
     ) -> None:
+        cls = library.component(kind, node.place_of("type"))
         lookup = _scope_lookup(values, netlist)
-        instance = self.instance(cls, node, lookup, overrides, full, netlist.folder)
+        instance = self.instance(cls, node, lookup, overrides, full, netlist.folder, self.start_fields(cls))
         try:
             for declared in [*cls.ports(), *cls.declared(State), *cls.declared(Held), *cls.declared(Observable)]:
                 instance.size_of(declared.size)
         except ComponentError as error:
             raise InputError(f"{full}: {error}", node.place) from None
-        stateful = {s.name: s for form in cls.forms() for s in form.declared(State) + form.declared(Held)}
+        forms = library.forms(cls)
+        begins = [s for form in forms for s in form.declared(State) + form.declared(Held)]
+        stateful = {s.name: s for s in begins if not isinstance(s, Scheduled)}
         start: dict[str, np.ndarray] = {}
         given = node.value["start"].value if isinstance(node.value, dict) and "start" in node.value else {}
         assert isinstance(given, dict)  # as the netlist checked
@@ -224,17 +241,36 @@ class _Elaboration:
                     f"{full}: no state {name!r} to start: {nearest(name, stateful)}", node.place_of("start", name)
                 )
         for name, declared in stateful.items():
-            text = overrides.take(f"{full}.start.{name}")
-            source = Node(text, COMMAND) if text is not None else given.get(name)
-            if source is not None:
+            setting = overrides.take(f"{full}.start.{name}")
+            source = Node(setting, COMMAND) if isinstance(setting, str) else given.get(name)
+            subject = f"{'--set ' if setting is not None else ''}{full}.start.{name}"
+            if setting is not None and not isinstance(setting, str):
+                start[name] = _si(setting, subject)
+            elif source is not None:
                 quantity = instance.quantity(declared.quantity)
                 items = source.value if isinstance(source.value, list) else [source]
-                subject = f"{'--set ' if text is not None else ''}{full}.start.{name}"
                 start[name] = np.array([_number(str(i.value), quantity, lookup, subject, i.place) for i in items])
-        self.instances[full] = Instance(full, instance, node.place, start)
+            elif self.start_pressure is not None and _takes_start_pressure(cls, instance, declared):
+                start[name] = np.array([self.start_pressure])
+        assert isinstance(node.value, dict)
+        places = {name: child.place for name, child in node.value.items()}
+        places |= {name: COMMAND for name in cls.model_fields if f"{full}.{name}" in overrides.used}
+        self.instances[full] = Instance(full, instance, node.place, start, tuple(forms), places)
 
-    def instance(self, cls: type[Any], node: Node, lookup: Any, overrides: _Overrides, full: str, folder: Path) -> Any:
+    def start_fields(self, cls: type[Component]) -> dict[str, float]:
+        """The parameters of a class that the circuit's start pressure serves where they are not given."""
+        if self.start_pressure is None:
+            return {}
+        named = {s.start for form in cls.forms() for s in form.declared(State) if s.quantity is QUANTITIES["pressure"]}
+        return {n: self.start_pressure for n in cls.model_fields if n == START_PRESSURE or n in named}
+
+    def instance(
+        self, cls: type[Any], node: Node, lookup: Any, overrides: _Overrides, full: str, folder: Path,
+        otherwise: Mapping[str, float] | None = None,
+    ) -> Any:  # fmt: skip
         """Validate a component or fluid; expressions become numbers first, ``--set`` texts replace.
+
+        Of parameters that nobody gives, those in ``otherwise`` have these values.
 
         Those of equal values are one object: a large circuit has few kinds of parts.
         """
@@ -244,15 +280,21 @@ class _Elaboration:
         given = {name: child for name, child in node.value.items() if name not in kept}
         from_command: set[str] = set()
         fields = {info.alias or name: info for name, info in cls.model_fields.items()}
-        for name in fields:
-            text = overrides.take(f"{full}.{name}")
-            if text is not None:
-                given[name] = Node(text, COMMAND)
+        numbers: dict[str, Any] = {}
+        for name, info in fields.items():
+            setting = overrides.take(f"{full}.{name}")
+            if setting is not None:
                 from_command.add(name)
+                if not isinstance(setting, str):
+                    numbers[name] = _written(setting, info, given.get(name), lookup, f"--set {full}.{name}")
+                given[name] = Node(str(setting), COMMAND)
         for name, child in given.items():
-            info = fields.get(name)
+            found = fields.get(name)
             where = f"--set {full}.{name}" if name in from_command else f"{full}.{name}"
-            data[name] = _plain(child, info, lookup, where) if info is not None else child.plain()
+            data[name] = numbers.get(name)
+            if data[name] is None:
+                data[name] = _plain(child, found, lookup, where) if found is not None else child.plain()
+        data = {**(otherwise or {}), **data}
         key = cls, folder, repr(data)
         if key in self.made:
             return self.made[key]
@@ -388,6 +430,28 @@ class _Elaboration:
         return [net for name, net in self.nets.items() if root(name) == name]
 
 
+def _start_pressure(netlist: Netlist, overrides: _Overrides) -> float | None:
+    """The start pressure of parts that state none of their own [Pa], if the circuit names one."""
+    text, place = netlist.sections.simulation.start_pressure, netlist.place("simulation", "start_pressure")
+    if text is None:
+        return None
+    values = _parameter_values(netlist, {}, overrides, "")
+    return _number(text, QUANTITIES["pressure"], _scope_lookup(values, netlist), "simulation.start_pressure", place)
+
+
+def _takes_start_pressure(cls: type[Component], instance: Component, declared: State | Held) -> bool:
+    """Whether a state begins at the circuit's start pressure: a pressure of fluid whose start is a plain number.
+
+    One that begins at a parameter or is computed follows from these (:meth:`_Elaboration.start_fields`).
+    """
+    return (
+        isinstance(declared, State)
+        and isinstance(declared.start, (int, float))
+        and instance.quantity(declared.quantity) is QUANTITIES["pressure"]
+        and any(port.domain is HYDRAULIC for port in cls.ports())
+    )
+
+
 def _kind(default: str) -> Quantity | None:
     """The quantity that a parameter's default shows; None for words, expressions, and what cannot be read."""
     if is_expression(default) or not is_number(default):
@@ -414,9 +478,12 @@ def _parameter_values(
                 raise ExpressionError(f"parameters depend on each other: {' -> '.join([*running, name])}")
             running.append(name)
             place = netlist.place("parameters", name)
-            text = overrides.take(prefix + name)
-            if text is not None:
-                values[name] = _value(text, find, f"--set {prefix}{name}", COMMAND, _kind(texts[name]))
+            setting = overrides.take(prefix + name)
+            if isinstance(setting, str):
+                values[name] = _value(setting, find, f"--set {prefix}{name}", COMMAND, _kind(texts[name]))
+            elif setting is not None:
+                own = _value(texts[name], find, name, place)
+                values[name] = _si_value(setting, own, f"--set {prefix}{name}")
             elif name in passed:
                 values[name] = passed[name]
             else:
@@ -452,6 +519,37 @@ def _value(text: str, lookup: Any, subject: str, place: Place | None, kind: Quan
         return Value(text)
     except InputError as error:
         raise _described(error, subject, place) from None
+
+
+def _si(setting: Any, subject: str) -> np.ndarray:
+    """Start values handed over as numbers."""
+    array = np.atleast_1d(np.asarray(setting))
+    if array.ndim != 1 or array.dtype.kind not in "if":
+        raise InputError(f"{subject}: write one number in SI, or a list of them")
+    return array.astype(float)
+
+
+def _si_value(setting: Any, own: Value, subject: str) -> Value:
+    """A circuit parameter handed over as a number: of the quantity that its own value has."""
+    if isinstance(own.value, str) and not isinstance(setting, bool):
+        raise InputError(f"{subject}: {setting} is a number, where a word such as {own.value!r} belongs")
+    if isinstance(setting, (tuple, bool)):
+        raise InputError(f"{subject}: write one number in SI, or text with a unit")
+    return Value(float(setting), own.quantity, own.written)
+
+
+def _written(setting: Any, info: FieldInfo, own: Node | None, lookup: Any, subject: str) -> Any:
+    """A component's parameter handed over as a number, as pydantic takes it."""
+    if field_quantity(info) is not None:
+        if isinstance(setting, bool):
+            raise InputError(f"{subject}: {setting} is no number; write one in SI, or text with a unit")
+        return setting
+    if is_structural(info) or own is None or not isinstance(own.value, str) or isinstance(setting, (tuple, bool)):
+        return list(setting) if isinstance(setting, tuple) else setting
+    # the component reads the quantity off the unit that the circuit wrote
+    text = _plain(own, info, lookup, subject)
+    unit = parse_any(text)[1].si if isinstance(text, str) and is_number(text) else ""
+    return f"{float(setting)!r} {unit if unit != '1' else ''}".strip()
 
 
 def _described(error: InputError, subject: str, place: Place | None) -> InputError:

@@ -7,9 +7,14 @@
     |   +-- UnitError       a unit is unknown, missing or of another quantity
     |   +-- ExpressionError an expression is not arithmetic, or its dimensions clash
     |   +-- CausalityError  the nets cannot be given an order of evaluation
+    |   +-- MovingError     there is no steady state: the time itself moves the circuit
+    |   +-- ArgumentError   a Python function was handed what it cannot take (a TypeError too)
     +-- ComponentError      a component class breaks its contract (its author's mistake)
+    |   +-- ContractError   found by crescentlab.contract (an AssertionError too)
     +-- SimulationError     the run itself failed               exit code 3
+    +-- CompilerError       nothing can be compiled here; caught where there is another way
 
+Pydantic's own error is left to those who make a component's instance by its class, as authors do in their tests.
 An :class:`InputError` carries the place it speaks of, so that its text begins ``FILE:LINE: ``.
 A :class:`ComponentError` found while a circuit is read is reported as the user's input too,
 for the user wrote the class.
@@ -68,8 +73,24 @@ class CausalityError(InputError):
     """The nets cannot be evaluated: no giver, two givers, or an algebraic loop."""
 
 
+class MovingError(InputError):
+    """The time itself keeps a circuit from coming to rest: ``why``, and what to do then."""
+
+    def __init__(self, why: str, advice: str) -> None:
+        super().__init__(f"{why}; {advice}")
+        self.why = why
+
+
+class ArgumentError(InputError, TypeError):
+    """A Python function was handed what it cannot take."""
+
+
 class ComponentError(CrescentlabError):
     """A component class breaks the contract of :class:`crescentlab.component.Component`."""
+
+
+class ContractError(ComponentError, AssertionError):
+    """A component breaks a rule that :mod:`crescentlab.contract` looks at."""
 
 
 class SimulationError(CrescentlabError):

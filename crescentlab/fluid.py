@@ -12,6 +12,8 @@ from crescentlab.units import Pressure
 
 P_ATM = 101325.0
 """Standard atmosphere [Pa]: gauge pressure + P_ATM is absolute pressure."""
+HIGHEST_PRESSURE = 1000e5
+"""Highest gauge pressure [Pa] of a law that says nothing else: docs/fluids.md, its range."""
 
 
 class Fluid(BaseModel):
@@ -37,6 +39,9 @@ class Fluid(BaseModel):
         default=False, description="true: pressures below absolute zero warn instead of ending the run"
     )
     atmospheric_pressure: Pressure = Field(default=P_ATM, gt=0, description="absolute pressure at 0 bar gauge")
+    highest_pressure: Pressure = Field(
+        default=HIGHEST_PRESSURE, gt=0, description="gauge pressure up to which its law is meant; beyond, a run warns"
+    )
 
     def density(self, p: Expr) -> Expr:
         """rho(p) [kg/m^3]."""

@@ -43,6 +43,14 @@ class Library:
             raise InputError(f"unknown component type {name!r}: {hint}", place)
         return self.components[name]
 
+    def forms(self, family: type[Component]) -> list[type[Component]]:
+        """The causal forms of a family here: its own first, then those that other files of this library add."""
+        own = family.forms()
+        if not family.family:
+            return own
+        added = [cls for cls in self.components.values() if issubclass(cls, family) and not cls.family]
+        return own + [cls for cls in added if not any(issubclass(cls, form) for form in own)]
+
     def fluid(self, name: str, place: Place | None = None) -> type[Fluid]:
         """The fluid class called ``name``; raises :class:`InputError` offering the nearest."""
         if name not in self.fluids:

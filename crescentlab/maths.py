@@ -31,7 +31,7 @@ class Tracer(Protocol):
     """Collects relations while a component is traced."""
 
     halvings: dict[tuple[int, bytes], tuple[ca.SX, list[ca.SX]]]
-    """Answers that tables have asked for, by place in the graph and knots: a table asked twice has its relations once."""
+    """Answers that tables have asked for, by place in the graph and knots: a table asked twice has them once."""
 
     def bit(self, relation: Relation) -> ca.SX:
         """The frozen bit (0 or 1) that stands for ``relation``."""

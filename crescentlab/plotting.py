@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from crescentlab.errors import InputError
+from crescentlab.errors import InputError, nearest
 from crescentlab.netlist import Netlist, PlotSection
 from crescentlab.units import QUANTITIES, Quantity, normalise
 
@@ -34,7 +34,10 @@ STYLE: dict[Any, Any] = {
 
 def plot_series(result: Result, names: Sequence[str], path: Path | None = None, title: str | None = None) -> Figure:
     """Draw variables over time, one axis per quantity; save the figure if ``path`` is given."""
-    figure = _figure(result, PlotSection(y=list(names) or result.net_pressures(), title=title))
+    shown = list(names) or result.net_pressures()
+    if not shown:
+        raise InputError(f"nothing to plot; name variables: {nearest('', result.names)}")
+    figure = _figure(result, PlotSection(y=shown, title=title))
     if path is not None:
         save_figure(figure, path)
     return figure

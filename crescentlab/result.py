@@ -1,4 +1,4 @@
-"""Named, unit-carrying series of a run; netCDF, CSV and Parquet files of them.
+"""Named, unit-carrying series of a run.
 
 A result keeps times, states and held values; every other variable is evaluated from the circuit's own
 equations when it is asked for. A file holds what was recorded, and says so.
@@ -6,21 +6,22 @@ equations when it is asked for. A file holds what was recorded, and says so.
 
 from __future__ import annotations
 
-import csv
 import dataclasses
 import functools
 import math
 import re
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from crescentlab import __version__
+from crescentlab import __version__, arguments
+from crescentlab.arguments import Number
 from crescentlab.errors import InputError, nearest
-from crescentlab.files import check_writable, replacing
-from crescentlab.units import DISPLAY, Quantity
+from crescentlab.files import check_writable
+from crescentlab.series_files import END, NETS, SUFFIXES, write_series
+from crescentlab.units import DISPLAY, QUANTITIES, Quantity
 
 if TYPE_CHECKING:
     import pandas
@@ -31,13 +32,18 @@ if TYPE_CHECKING:
     from crescentlab.solvers.trajectory import Trajectory
     from crescentlab.system import System, Values
 
-SUFFIXES = (".nc", ".csv", ".parquet")
-END = "end_of_run"
-"""Attribute of a file that tells where its run stands, whole: what ``--start`` reads."""
+
+EVENTS = ("after", "both")
+"""Which rows of an event's instant a table holds: the last one alone, or those before as well."""
+SHOWN = 8
+"""Most variables that a result's ``repr`` lists."""
 
 
 class Result:
-    """A run of a circuit. ``result["line.p"]`` is a numpy array in SI, one row per time."""
+    """A run of a circuit. ``result["line.p"]`` is a numpy array in SI, one row per time.
+
+    A variable that the run does not have raises :class:`InputError`; ``name in result`` asks, ``list(result)`` lists.
+    """
 
     def __init__(self, system: System, values: Values, design: Design, trajectory: Trajectory) -> None:
         self.system, self.values, self.design, self.trajectory = system, values, design, trajectory
@@ -55,13 +61,64 @@ class Result:
         """Every variable that can be asked for."""
         return [name for name, v in self.system.variables.items() if v.listed]
 
+    @property
+    def status(self) -> str:
+        """``done``, ``stopped`` (by stop_when), ``failed`` or ``interrupted``; of a .csv file ``unknown``."""
+        return self.trajectory.status
+
+    @property
+    def warnings(self) -> list[str]:
+        """What the circuit's text, the run and its ledgers warn of."""
+        own = self.balance.warnings if self.balance else []
+        return [*self.design.warnings, *self.trajectory.warnings, *own]
+
+    @property
+    def end(self) -> str | None:
+        """Where the run stands, as text that another run can go on from; None if it failed."""
+        end = self.trajectory.end
+        return None if end is None else end.as_text(self.system)
+
+    def __contains__(self, name: object) -> bool:
+        """Whether there is a variable, or an element of one, of this name."""
+        if not isinstance(name, str):
+            return False
+        base = split(name)[0]
+        return base in self.names and (name == base or name in self.elements(base))
+
+    def __iter__(self) -> Iterator[str]:
+        """The names of all variables."""
+        return iter(self.names)
+
+    def __repr__(self) -> str:
+        """Title, how it ended, span, and what can be asked for."""
+        names, t = self.names, self.time
+        span = f"{t[0]:g} s to {t[-1]:g} s" if t.size else "no time"
+        more = f", ... {len(names) - SHOWN} more" if len(names) > SHOWN else ""
+        first = [*self.net_pressures(), *names]
+        shown = ", ".join(list(dict.fromkeys(n for n in first if n in names))[:SHOWN])
+        title = self.title if len(self.title) <= 60 else f"{self.title[:57]}..."
+        return (
+            f"<Result {title!r}: {self.status}, {span}, {t.size} row{'' if t.size == 1 else 's'}, "
+            f"{len(names)} variables: {shown}{more}>"
+        )
+
+    def summed_up(self) -> str:
+        """The last values of the outputs and net pressures, the first few, in display units."""
+        names = [o.name for o in self.design.outputs if o.scope == ""] + self.net_pressures()
+        columns = [column for name in names for column in self.elements(name)] or self.column_names
+        shown = [
+            f"{n} {quantity.show(float(self[n][-1]) + 0.0, self.display_unit(quantity))}"
+            for n, quantity in ((n, self.quantity(n)) for n in columns[:SHOWN])
+        ]
+        return ", ".join(shown) + (f", ... {len(columns) - SHOWN} more" if len(columns) > SHOWN else "")
+
     def quantity(self, name: str) -> Quantity:
         """The quantity of a variable or of one element of it."""
-        return self.system.find(_split(name)[0]).quantity
+        return self.system.find(split(name)[0]).quantity
 
     def __getitem__(self, name: str) -> np.ndarray:
         """Series of a variable: shape (m,), for a vector (m, n); ``name[2]`` is one element (from 1)."""
-        base, element = _split(name)
+        base, element = split(name)
         self.load([base])
         series = self._series[base]
         if element is None:
@@ -72,7 +129,7 @@ class Result:
 
     def load(self, names: Iterable[str]) -> None:
         """Evaluate several variables at once (faster than one by one)."""
-        missing = [n for n in dict.fromkeys(names) if n not in self._series]
+        missing = [n for n in dict.fromkeys(arguments.names(names, "variable")) if n not in self._series]
         if not missing:
             return
         sizes = [len(self.system.find(n).expression()) for n in missing]
@@ -88,40 +145,53 @@ class Result:
             return self
         return Result(self.system, self.values, self.design, dataclasses.replace(self.trajectory, grid=None))
 
-    def mean(self, name: str, start: float = 0.0, stop: float = math.inf) -> float:
+    def mean(self, name: str, start: Number = 0.0, stop: Number | None = None) -> float:
         """Mean over time between ``start`` and ``stop`` [s], trapezoidal between the accepted steps."""
         full = self.by_steps
-        inside = (full.time >= start) & (full.time <= stop)
+        begin = arguments.quantity(start, "start", QUANTITIES["time"])
+        end = math.inf if stop is None else arguments.quantity(stop, "stop", QUANTITIES["time"])
+        inside = (full.time >= begin) & (full.time <= end)
         t, y = full.time[inside], full[name][inside]
         if not t.size:
-            raise InputError(f"{name}: the run has no rows between {start:g} s and {stop:g} s")
+            raise InputError(f"{name}: the run has no rows between {begin:g} s and {end:g} s")
         return float(np.trapezoid(y, t) / (t[-1] - t[0])) if t[-1] > t[0] else float(y[-1])
 
     @functools.cached_property
     def balance(self) -> Balance | None:
-        """The ledger of stored fluid; None with mean volumes or without storing parts."""
+        """The ledgers of fluid and energy; None without parts that keep books, or where :attr:`unbalanced` says why."""
         from crescentlab.balance import balance
 
-        if any(getattr(i.component, "volumes", "") == "mean" for i in self.design.instances.values()):
+        if self.unbalanced:
             return None
         return balance(self.system, self.values, self.trajectory)
+
+    @property
+    def unbalanced(self) -> dict[str, str]:
+        """Per component whose volumes do not follow its flows, why: no ledger of such a run can close."""
+        why = {name: instance.component.unbalanced for name, instance in self.design.instances.items()}
+        return {name: said for name, said in why.items() if said}
 
     # -- out -------------------------------------------------------------------------------------
 
     def columns(self, record: Sequence[str] = ()) -> dict[str, np.ndarray]:
         """Series by column name, vectors element by element, chosen by globs (``*`` and ``?`` only)."""
         names = self.chosen(record)
-        self.load(dict.fromkeys(_split(n)[0] for n in names))
+        self.load(dict.fromkeys(split(n)[0] for n in names))
         return {n: self[n] for n in names}
+
+    @property
+    def column_names(self) -> list[str]:
+        """Names of the columns of files and tables, vectors element by element."""
+        return column_names(self.system)
 
     def chosen(self, record: Sequence[str] = ()) -> list[str]:
         """Column names that match the globs, all of them without globs."""
-        every = column_names(self.system)
-        return matching(record, every, "--record") if record else every
+        every, globs = self.column_names, arguments.names(record, "record")
+        return matching(globs, every, "--record") if globs else every
 
     def elements(self, name: str) -> list[str]:
         """A variable's columns: itself, or for a vector each of its elements."""
-        base, element = _split(name)
+        base, element = split(name)
         variable = self.system.find(base)
         if element is not None or not variable.vector:
             return [name]
@@ -140,33 +210,55 @@ class Result:
         return {
             "title": self.title, "source": f"crescentlab {__version__}", "circuit": self.design.netlist.name,
             "solver": t.solver, "status": t.status, "complete": int(t.complete), "error": t.error,
-            **({} if t.end is None else {END: t.end.as_text(self.system)}),
+            NETS: ", ".join(self.net_pressures()),
+            **({} if self.end is None else {END: self.end}),
         }  # fmt: skip
 
-    def to_dataframe(self, record: Sequence[str] = ()) -> pandas.DataFrame:
-        """A data frame indexed by time [s]."""
+    def to_dataframe(self, record: str | Sequence[str] = (), *, events: str = "after") -> pandas.DataFrame:
+        """A data frame indexed by time [s].
+
+        An event's instant has one row, the values ``after`` it, so that the index is unique; with ``events="both"``
+        it has a row for the values before as well, as ``result.time`` and files do.
+        """
         import pandas as pd
 
-        return pd.DataFrame(self.columns(record), index=pd.Index(self.time, name="time"))
+        rows = self._table_rows(events)
+        data = {name: series[rows] for name, series in self.columns(record).items()}
+        return pd.DataFrame(data, index=pd.Index(self.time[rows], name="time"))
 
-    def to_xarray(self, record: Sequence[str] = ()) -> xarray.Dataset:
-        """A data set over the dimension time, units in the attributes."""
+    def to_xarray(self, record: str | Sequence[str] = (), *, events: str = "after") -> xarray.Dataset:
+        """A data set over the dimension time, units in the attributes; ``events`` as in :meth:`to_dataframe`."""
         import xarray as xr
 
-        data = {n: ("time", v, {"units": self.quantity(n).si}) for n, v in self.columns(record).items()}
-        return xr.Dataset(data, coords={"time": ("time", self.time, {"units": "s"})}, attrs=self.attributes())
+        rows = self._table_rows(events)
+        data = {n: ("time", v[rows], {"units": self.quantity(n).si}) for n, v in self.columns(record).items()}
+        return xr.Dataset(data, coords={"time": ("time", self.time[rows], {"units": "s"})}, attrs=self.attributes())
 
-    def write(self, path: Path, record: Sequence[str] = ()) -> None:
-        """Write a file whose suffix chooses the format: .nc, .csv or .parquet."""
+    def _table_rows(self, events: str) -> np.ndarray:
+        """The rows of a table, as a mask: all, or the last of each instant."""
+        if arguments.choice(events, "events", EVENTS) == "both":
+            return np.ones(self.time.size, dtype=bool)
+        return np.append(np.diff(self.time) > 0, True)[: self.time.size]
+
+    def write(self, path: Path | str, record: str | Sequence[str] = ()) -> None:
+        """Write a file whose suffix chooses the format: .nc, .csv or .parquet; an event's instant has both its rows."""
+        target = arguments.path(path, "path")
+        check_writable(target, SUFFIXES, f"the suffix {target.suffix!r} is none of {', '.join(SUFFIXES)}")
         columns = self.columns(record)
         units = {n: self.quantity(n).si for n in columns}
-        write_series(path, self.time, columns, units, self.attributes())
+        write_series(target, self.time, columns, units, self.attributes())
 
     def plot(self, *names: str, path: Path | str | None = None, title: str | None = None) -> Any:
-        """A matplotlib figure of the variables over time, saved if ``path`` is given."""
+        """A matplotlib figure of the variables over time, saved if ``path`` is given; without names the net pressures.
+
+        Raises :class:`InputError` for what is no variable, and for a path that cannot be written.
+        """
         from crescentlab.plotting import plot_series
 
-        return plot_series(self, list(names), path=Path(path) if path else None, title=title)
+        flat = [each for name in names for each in arguments.names(name, "plot")]
+        if title is not None and not isinstance(title, str):
+            raise InputError(f"plot: the title {title!r} is no text")
+        return plot_series(self, flat, path=None if path is None else arguments.path(path, "path"), title=title)
 
     def display_unit(self, quantity: Quantity) -> str:
         """The unit that the circuit's ``display:`` shows a quantity in; by default the one engineers use."""
@@ -174,7 +266,10 @@ class Result:
         return chosen.get(quantity.name) or next(iter(quantity.units)) or quantity.si
 
 
-def _split(name: str) -> tuple[str, int | None]:
+def split(name: str) -> tuple[str, int | None]:
+    """A column's variable, and which of its elements it is."""
+    if not isinstance(name, str):
+        raise InputError(f"{name!r} is no name of a variable; write for example result['line.p']")
     match = re.fullmatch(r"(.*)\[(\d+)\]", name)
     return (match[1], int(match[2])) if match else (name, None)
 
@@ -208,122 +303,3 @@ def matching(globs: Sequence[str], names: Sequence[str], subject: str) -> list[s
             raise InputError(f"{subject} {glob}: no variable matches: {nearest(glob, names)}")
         chosen.update(dict.fromkeys(hits))
     return list(chosen)
-
-
-def result_target(output: str | None, name: str) -> Path | None:
-    """The file that ``-o`` names, by default ``name``.nc, checked before the run; None for ``-o none``."""
-    if output == "none":
-        return None
-    path = Path(output or f"{name}.nc")
-    check_writable(
-        path, SUFFIXES,
-        f"the suffix {path.suffix!r} is none of {', '.join(SUFFIXES)}; write for example -o {path.stem or 'result'}.nc",
-    )  # fmt: skip
-    return path
-
-
-def write_series(
-    path: Path, time: np.ndarray, columns: dict[str, np.ndarray], units: dict[str, str], attributes: dict[str, Any]
-) -> None:
-    """Write series to a file; the suffix chooses the format. An old file is replaced when the new one is complete."""
-    with replacing(path) as part:
-        _WRITERS[path.suffix](part, time, columns, units, attributes)
-
-
-def _write_csv(
-    path: Path, time: np.ndarray, columns: dict[str, np.ndarray], units: dict[str, str], attributes: dict[str, Any]
-) -> None:
-    with path.open("w", newline="", encoding="utf-8") as file:
-        writer = csv.writer(file)
-        writer.writerow(["time [s]", *[f"{n} [{units[n]}]" for n in columns]])
-        for row in zip(time.tolist(), *[v.tolist() for v in columns.values()], strict=True):
-            writer.writerow([repr(v) for v in row])
-
-
-def _write_parquet(
-    path: Path, time: np.ndarray, columns: dict[str, np.ndarray], units: dict[str, str], attributes: dict[str, Any]
-) -> None:
-    import pyarrow as pa
-    import pyarrow.parquet as pq
-
-    fields = [pa.field("time", pa.float64(), metadata={"units": "s"})]
-    fields += [pa.field(n, pa.float64(), metadata={"units": units[n]}) for n in columns]
-    schema = pa.schema(fields, metadata={k: str(v) for k, v in attributes.items()})
-    pq.write_table(pa.table([time, *columns.values()], schema=schema), path)
-
-
-def _write_netcdf(
-    path: Path, time: np.ndarray, columns: dict[str, np.ndarray], units: dict[str, str], attributes: dict[str, Any]
-) -> None:
-    """netCDF4 as h5netcdf lays it out, but with the list of all variables of the time axis written once.
-
-    Attached one by one, n variables rewrite that list n times: 128 MB of waste in a file of 4000 variables.
-    """
-    import h5py
-
-    with h5py.File(path, "w", track_order=True) as file:
-        if END in attributes:  # too long for an attribute of netCDF
-            file.create_dataset(END, data=attributes.pop(END), dtype=h5py.string_dtype())
-        file.attrs.update(attributes)
-        axis = file.create_dataset("time", data=time)
-        axis.make_scale("time")
-        axis.attrs.update({"units": "s", "_Netcdf4Dimid": np.int32(0)})
-        of_axis = np.empty(1, dtype=object)
-        of_axis[0] = np.array([axis.ref], dtype=h5py.ref_dtype)
-        users = []
-        for name, series in columns.items():
-            variable = file.create_dataset(name, data=series)
-            variable.attrs["units"] = units[name]
-            variable.attrs.create("DIMENSION_LIST", of_axis, dtype=h5py.vlen_dtype(h5py.ref_dtype))
-            users.append((variable.ref, 0))
-        if users:
-            pair = np.dtype([("dataset", h5py.ref_dtype), ("dimension", np.int32)])
-            axis.attrs.create("REFERENCE_LIST", np.array(users, dtype=pair))
-
-
-_WRITERS = {".csv": _write_csv, ".parquet": _write_parquet, ".nc": _write_netcdf}
-
-
-def read_series(path: Path) -> tuple[np.ndarray, dict[str, np.ndarray], dict[str, str], dict[str, Any]]:
-    """Read a result file back: times, series, units, attributes. Raises :class:`InputError`."""
-    if path.suffix not in SUFFIXES:
-        raise InputError(f"{path}: not a result file; its suffix must be one of {', '.join(SUFFIXES)}")
-    if not path.is_file():
-        raise InputError(f"{path}: no such file; `crescentlab simulate` writes one")
-    try:
-        return {".csv": _read_csv, ".parquet": _read_parquet, ".nc": _read_netcdf}[path.suffix](path)
-    except (OSError, ValueError, KeyError) as error:
-        raise InputError(f"{path}: not a result file of crescentlab ({error})") from None
-
-
-def _read_csv(path: Path) -> tuple[np.ndarray, dict[str, np.ndarray], dict[str, str], dict[str, Any]]:
-    with path.open(newline="", encoding="utf-8") as file:
-        titles, *rows = list(csv.reader(file)) or [[]]
-    split = [re.fullmatch(r"(.*) \[(.*)\]", t) for t in titles]
-    if not rows or not all(split) or titles[0] != "time [s]":
-        raise ValueError("its first line is not `time [s]` and names with units")
-    units = {m[1]: m[2] for m in split if m}
-    time, *series = np.array(rows, dtype=float).T
-    return time, dict(zip(list(units)[1:], series, strict=True)), units, {}
-
-
-def _read_parquet(path: Path) -> tuple[np.ndarray, dict[str, np.ndarray], dict[str, str], dict[str, Any]]:
-    import pyarrow.parquet as pq
-
-    table = pq.read_table(path)
-    units = {f.name: (f.metadata or {}).get(b"units", b"").decode() for f in table.schema}
-    series = {n: table[n].to_numpy() for n in table.column_names}
-    attributes = {k.decode(): v.decode() for k, v in (table.schema.metadata or {}).items()}
-    return series.pop("time"), series, units, attributes
-
-
-def _read_netcdf(path: Path) -> tuple[np.ndarray, dict[str, np.ndarray], dict[str, str], dict[str, Any]]:
-    import h5py
-
-    with h5py.File(path, "r") as file:
-        attributes = {k: v.item() if hasattr(v, "item") else v for k, v in file.attrs.items() if k[0] != "_"}
-        if END in file:
-            attributes[END] = file[END][()].decode()
-        series = {n: np.array(v) for n, v in file.items() if n != END}
-        units = {n: str(file[n].attrs.get("units", "")) for n in series}
-    return series.pop("time"), series, units, attributes

@@ -17,14 +17,16 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
+from crescentlab import units
 from crescentlab.causality import Plan
 from crescentlab.columns import Columns
 from crescentlab.component import Component
 from crescentlab.domain import Held, Scheduled, State
-from crescentlab.elaborate import Design
+from crescentlab.elaborate import COMMAND, Design
 from crescentlab.energy import keeps_books, power_ports
 from crescentlab.errors import InputError, nearest
 from crescentlab.prepared import LARGE, Prepared, jacobian, prepare, shared
+from crescentlab.pressures import ASKED, GivenPressure, absolute_zeros
 from crescentlab.schedule import Following
 from crescentlab.symbols import column
 from crescentlab.trace import numeric_fields, structure_of
@@ -71,6 +73,8 @@ class Bits:
     held_dependent: Array
     switches: Array
     """Chooses a value; the others serve conditions of events alone."""
+    floors: Array
+    """Holds a given pressure above absolute zero: sought where it turns, never throughout a step."""
 
 
 @dataclass
@@ -114,6 +118,8 @@ class System:
     counting_held: Array
     """Shape (k,): such held values."""
     bits: Bits
+    given: tuple[GivenPressure, ...]
+    """Pressures that ports give and that are neither states nor held values."""
     _variables: Callable[[], dict[str, Variable]]
     remapping: Callable[[list[bool]], tuple[ca.SX, list[ca.SX]]]
     """Which events may fire -> symbols (1 where one fires), and the new x and h as expressions of them."""
@@ -122,6 +128,8 @@ class System:
     _contents: dict[str, tuple[Callable[[], ca.SX], Callable[[], tuple[ca.SX, ca.SX]]]]
     _energies: Callable[[], dict[str, ca.SX]]
     _passing: Callable[[], dict[str, tuple[ca.SX, ca.SX]]]
+    outputs_by_part: Callable[[], list[tuple[str, ca.SX]]]
+    """What each component gives at its ports, in the order in which it is evaluated."""
     _once: dict[Any, Any] = field(default_factory=dict)
     built: dict[tuple[str, str], Prepared] = field(default_factory=dict)
     """Functions that have been compiled, by name and form (see :mod:`crescentlab.solvers.promotion`)."""
@@ -274,12 +282,41 @@ class System:
         for each in following:
             schedule = each.schedule(values.start_time, values.start_time)
             values.h0[each.places] = schedule.rows[schedule.at(values.start_time)]
+        self.check_constants(values, design)
         ticks = [event.name for event in self.events if event.kind == "every"]
         for tick, period in zip(ticks, np.array(self.period(values.p)).ravel() if ticks else (), strict=True):
             if not period > 0:
                 place = design.instances[tick.rpartition(".")[0]].place
                 raise InputError(f"{tick}: its period is {period:g} s; it must be above 0", place)
         return values
+
+    def check_constants(self, values: Values, design: Design) -> None:
+        """Raise :class:`InputError` if a pressure that parameters alone give lies below absolute zero."""
+        constant = [
+            each for each in self.given if not each.moving and not (each.fluid and design.fluids[each.fluid].tension)
+        ]
+        if not constant:
+            return
+
+        def made() -> ca.Function:
+            pressures = column([each.expression for each in constant])
+            return ca.Function(
+                "constants", [self.p], [pressures, absolute_zeros(self.plan, self.p, [c.fluid for c in constant])]
+            )
+
+        found, lowest = (np.array(each).ravel() for each in self.once("constant pressures", made)(values.p))
+        for each, p, least in zip(constant, found, lowest, strict=True):
+            if p < least:
+                instance = design.instances[each.owner]
+                field = next((n for n in each.parameters if n in instance.places), None)
+                name = each.name if field is None else f"{each.owner}.{field}"
+                place = instance.place if field is None else instance.places[field]
+                if place is COMMAND:
+                    name, place = f"--set {name}", None
+                raise InputError(
+                    f"{name}: {units.pressure.show(p, 'bar')} gauge is below absolute zero "
+                    f"({units.pressure.show(least, 'bar')}); {ASKED}", place,
+                )  # fmt: skip
 
 
 def _start(

@@ -133,7 +133,7 @@ def read_csv(path: Path, x: Quantity | None = None, y: Quantity | None = None, *
         values.append(table.numbers(name, quantities[k]))
         for cell, place in zip(table.columns[name].cells, table.places, strict=True):
             if not cell:
-                raise InputError(f"the cell in the column {name!r} is empty", place)
+                raise file.empty(k, place)
     try:
         return _curve(values[0].tolist(), values[1].tolist(), quantities[0], quantities[1], jumps, table.places)
     except InputError as error:

@@ -1,9 +1,9 @@
 """What of the assembled equations depends on time alone: conditions that become exact stops, values that set the pace.
 
-An integrator that steps over a pulse never sees it. So a comparison whose sides depend on time, parameters and held
-values but on no state becomes a relation wherever it is written, ``where(t > 1 s, ...)`` in a formula behind three
-signals included: its instant is known ahead, and no step passes it. What jumps (a comparison, ``sign``, ``floor``)
-reads its frozen bit; what only bends (``min``, ``max``, ``abs``) stays as it is and makes a stop at its kink.
+An integrator that steps over a pulse never sees it. So a comparison whose sides depend on time and parameters alone, or
+on held values and a straight line in time, becomes a relation wherever it is written, ``where(t > 1 s, ...)`` in a
+formula behind three signals included: its instant is known ahead, and no step passes it. What jumps (a comparison,
+``sign``, ``floor``) reads its frozen bit; what only bends (``min``, ``max``, ``abs``) makes a stop at its kink.
 """
 
 from __future__ import annotations
@@ -32,6 +32,8 @@ class TimeAlone:
     """Difference of the sides; positive: the bit is 1."""
     scales: list[ca.SX] = field(default_factory=list)
     strict: list[bool] = field(default_factory=list)
+    straight: list[bool] = field(default_factory=list)
+    """Whether the difference is a straight line in time between stops."""
     clock: ca.SX = field(default_factory=lambda: ca.SX(0, 1))
     """Values that curve in time and depend on nothing else but parameters, as they were written."""
 
@@ -55,6 +57,10 @@ class _Conditions(Walk):
         self.states, self.fixed = hashes(x), hashes(fixed)
         self.outcome = TimeAlone(value)
         self.met: dict[tuple[int, ...], ca.SX] = {}
+        self.straight = True
+        """Whether what the present instruction reads are straight lines in time between stops."""
+        self.degree: dict[int, int] = {}
+        """In t between stops: 0 constant, 1 a straight line, 2 any curve."""
 
     def done(self, paced: int) -> TimeAlone:
         timed, moving, held = set[int](), set[int](), set[int]()
@@ -65,19 +71,36 @@ class _Conditions(Walk):
                 for marks, symbols in ((timed, {self.t.element_hash()}), (moving, self.states), (held, self.fixed)):
                     if symbol in symbols:
                         marks.add(k)
+                self.degree[k] = int(k in timed)
                 continue
             for marks in (timed, moving, held):
                 if not marks.isdisjoint(parts):
                     marks.add(k)
             if k in moving or k in held:
                 alone |= {i: self.written[i] for i in parts if i in timed and i not in moving and i not in held}
-            if k in timed and k not in moving:
-                self.visit(k, op, parts)
+            if k in timed:
+                self.degree[k] = self.degree_of(op, [self.degree.get(i, 0) for i in parts])
+                self.straight = all(self.degree.get(i, 0) < 2 for i in parts)
+                if k not in moving and (k not in held or (self.straight and op not in WHOLE)):
+                    self.visit(k, op, parts)
         ends = {i for row, i in self.rows.items() if row < paced}
         alone |= {i: self.written[i] for i in ends if i in timed and i not in moving and i not in held}
         self.outcome.clock = self.curved(column(list(alone.values())))
         self.outcome.expression = self.result()
         return self.outcome
+
+    @staticmethod
+    def degree_of(op: int, degrees: list[int]) -> int:
+        """Degree of a result; a choice is constant between stops."""
+        if op in COMPARISONS or op in (ca.OP_NOT, ca.OP_AND, ca.OP_OR):
+            return 0
+        if op in (ca.OP_ADD, ca.OP_SUB, ca.OP_NEG, ca.OP_TWICE, ca.OP_ASSIGN, *KINKS):
+            return max(degrees)
+        if op == ca.OP_MUL or op == ca.OP_IF_ELSE_ZERO:
+            return min(sum(degrees), 2)
+        if op == ca.OP_DIV and not degrees[1]:
+            return degrees[0]
+        return 2 if any(degrees) else 0
 
     def visit(self, k: int, op: int, parts: list[int]) -> None:
         """Give instruction k, on time, its bit if it is a condition."""
@@ -85,8 +108,12 @@ class _Conditions(Walk):
             low, high = (self.now(i) for i in parts)
             self.changed[k] = self.bit(high - low, COMPARISONS[op], (op, *parts))
         elif op in KINKS:
-            values = [self.now(i) for i in parts]
-            self.bit(values[-1] - values[0] if len(values) == 2 else values[0], True, (op, *parts))
+            first, second = (values := [self.now(i) for i in parts])[0], -values[0] if len(values) == 1 else values[1]
+            more = self.bit(first - second if len(values) == 2 else first, True, (op, *parts))
+            if self.straight:  # of a curve a root may be missed; the operation itself is right on either side
+                self.changed[k] = (
+                    ca.if_else(more, second, first) if op == ca.OP_FMIN else ca.if_else(more, first, second)
+                )
         elif op == ca.OP_SIGN:
             value = self.now(parts[0])
             self.changed[k] = self.bit(value, True, (op, parts[0], 1)) - self.bit(-value, True, (op, parts[0], -1))
@@ -121,6 +148,7 @@ class _Conditions(Walk):
             parts = [difference.dep(i) for i in range(difference.n_dep())] or [difference]
             self.outcome.scales.append(sum((ca.fabs(part) for part in parts), ca.SX(0)))
             self.outcome.strict.append(strict)
+            self.outcome.straight.append(self.straight and difference.op() != ca.OP_SIN)
         return self.met[key]
 
     def curved(self, alone: ca.SX) -> ca.SX:

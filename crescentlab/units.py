@@ -10,14 +10,14 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from typing import Annotated, Any
 
 from pydantic import GetCoreSchemaHandler
 from pydantic_core import CoreSchema, PydanticCustomError, core_schema
 
-from crescentlab.errors import UnitError, nearest
+from crescentlab.errors import ComponentError, UnitError, nearest
 
 Dims = tuple[int, int, int, int]
 """Exponents of kg, m, s, K. Angles are pure numbers."""
@@ -57,20 +57,35 @@ class Quantity:
             return self.units[key]
         said = f"{text!r}: " if text else ""
         if not key:
-            raise UnitError(f"{said}{self.titled} needs a unit; write for example {self.example(text)}")
+            match = _NUMBER.match(text)
+            asked = f": {self._readings(float(match[1]))}?" if match else f"; write one of {self.choices()}"
+            raise UnitError(f"{said}{self.titled} needs a unit{asked}")
+        near = nearest_unit(key, self.units)
+        advice = f": {near} Write one of {self.choices()}" if near else f"; write one of {self.choices()}"
         others = [q.title for q in QUANTITIES.values() if key in q.units and q is not pressure_difference]
         if others:
-            raise UnitError(
-                f"{said}{unit!r} is a unit of {' and '.join(others[:3])}, not of {self.title}; "
-                f"write one of {self.choices()}"
-            )
-        raise UnitError(f"{said}unknown unit {unit!r} for {self.titled}; write one of {self.choices()}")
+            raise UnitError(f"{said}{unit!r} is a unit of {' and '.join(others[:3])}, not of {self.title}{advice}")
+        raise UnitError(f"{said}unknown unit {unit!r} for {self.titled}{advice}")
+
+    def _readings(self, value: float) -> str:
+        """An SI number in the SI unit and in usual ones, the largest first: ``0.001 m3, 1 L or 1000 cm3``."""
+        usual: dict[tuple[float, float], str] = {}
+        for unit in [normalise(self.si), *self.units]:
+            if unit and unit in self.units:
+                usual.setdefault((self.units[unit], self.offsets.get(unit, 0.0)), unit)
+        shown = sorted(list(usual.items())[:3], reverse=True)
+        texts = [self.show(value, unit, 6) for _, unit in shown]
+        return " or ".join([text for text in (", ".join(texts[:-1]), texts[-1]) if text])
 
     def check_difference(self, text: str) -> None:
         """Refuse a difference in a unit that counts from a zero of its own."""
         match = _NUMBER.match(text)
-        if match and self.offsets.get(normalise(match[2])):
-            raise UnitError(f"{text!r}: this is a difference of two {self.title}s; write {match[1]} {self.si}")
+        unit = normalise(match[2]) if match else ""
+        if match and self.offsets.get(unit):
+            plain = [u for u in (self.si, *self.units) if not self.offsets.get(u)]
+            same = next((u for u in plain if self.units.get(u) == self.units[unit]), self.si)
+            number = float(match[1]) * self.units[unit] / self.units[normalise(same)]
+            raise UnitError(f"{text!r}: this is a difference of two {self.title}s; write {number:g} {same}")
 
     @property
     def title(self) -> str:
@@ -122,6 +137,13 @@ def _split(text: str, advice: str = "") -> tuple[float, str]:
     return float(match[1]), match[2]
 
 
+def nearest_unit(unit: str, known: Iterable[str]) -> str:
+    """The question that offers units like this one, the same letters in another case first; empty if there are none."""
+    units = [u for u in known if u]
+    same = [u for u in units if u.lower() == unit.lower()]
+    return f"did you mean {' or '.join(same)}?" if same else nearest(unit, units, otherwise=" ").strip()
+
+
 def normalise(unit: str) -> str:
     """Fold the ways of writing one unit into one: ``mm^2``, ``mm²`` and ``mm2`` are ``mm2``."""
     text = unit.strip()
@@ -136,6 +158,11 @@ _PSI = 6894.757293168361
 _BAR = 1e5
 _LPM = 1e-3 / 60.0
 _GALLON = 231 * 0.0254**3
+_INCH, _FOOT = 0.0254, 0.3048
+_POUND, _POUND_FORCE = 0.45359237, 4.4482216152605
+_SLUG = _POUND_FORCE / _FOOT
+ATMOSPHERE = 101325.0
+"""The standard atmosphere [Pa]: pressures are gauge, so an absolute one is less by this."""
 
 _PER_TIME = {"1/s": 1.0, "1/min": 1.0 / 60.0}
 
@@ -150,33 +177,44 @@ def _quantity(name: str, si: str, dims: Dims, nominal: float, units: Mapping[str
 
 _PRESSURE_UNITS = {
     "bar": _BAR, "Pa": 1.0, "kPa": 1e3, "MPa": 1e6, "GPa": 1e9, "mbar": 100.0, "hPa": 100.0,
-    "psi": _PSI, "N/mm2": 1e6, "N/m2": 1.0, "atm": 101325.0,
+    "psi": _PSI, "N/mm2": 1e6, "N/m2": 1.0, "atm": ATMOSPHERE, "kgf/cm2": 98066.5, "mH2O": 9806.65,
 }  # fmt: skip
-_LENGTH_UNITS = {"mm": 1e-3, "m": 1.0, "cm": 1e-2, "um": 1e-6, "nm": 1e-9, "in": 0.0254, "ft": 0.3048}
-_AREA_UNITS = {"mm2": 1e-6, "m2": 1.0, "cm2": 1e-4, "in2": 0.0254**2}
+_GAUGE_UNITS = {"barg": _BAR, "psig": _PSI}
+_ABSOLUTE_UNITS = {"bara": _BAR, "psia": _PSI}
+_LENGTH_UNITS = {"mm": 1e-3, "m": 1.0, "cm": 1e-2, "um": 1e-6, "nm": 1e-9, "in": _INCH, "ft": _FOOT}
+_AREA_UNITS = {"mm2": 1e-6, "m2": 1.0, "cm2": 1e-4, "in2": _INCH**2, "ft2": _FOOT**2}
 _VOLUME_UNITS = {
     "cm3": 1e-6, "m3": 1.0, "L": 1e-3, "l": 1e-3, "mL": 1e-6, "ml": 1e-6, "cc": 1e-6, "mm3": 1e-9, "dm3": 1e-3,
-    "in3": 0.0254**3, "gal": _GALLON,
+    "in3": _INCH**3, "gal": _GALLON, "ft3": _FOOT**3,
 }  # fmt: skip
 _TIME_UNITS = {"ms": 1e-3, "s": 1.0, "us": 1e-6, "ns": 1e-9, "min": 60.0, "h": 3600.0}
 _ANGLE_UNITS = {"deg": math.pi / 180.0, "rad": 1.0, "°": math.pi / 180.0, "mrad": 1e-3, "rev": 2 * math.pi}
-_FORCE_UNITS = {"N": 1.0, "kN": 1e3, "MN": 1e6, "mN": 1e-3, "lbf": 4.4482216152605}
-_TORQUE_UNITS = {"Nm": 1.0, "N m": 1.0, "kNm": 1e3, "kN m": 1e3, "Nmm": 1e-3, "N mm": 1e-3, "mNm": 1e-3}
+_FORCE_UNITS = {"N": 1.0, "kN": 1e3, "MN": 1e6, "mN": 1e-3, "lbf": _POUND_FORCE}
+_TORQUE_UNITS = {
+    "Nm": 1.0, "N m": 1.0, "kNm": 1e3, "kN m": 1e3, "Nmm": 1e-3, "N mm": 1e-3, "mNm": 1e-3,
+    "lbf ft": _POUND_FORCE * _FOOT, "lbf in": _POUND_FORCE * _INCH, "ft lbf": _POUND_FORCE * _FOOT,
+    "in lbf": _POUND_FORCE * _INCH,
+}  # fmt: skip
 _FLOW_UNITS = {
     "L/min": _LPM, "l/min": _LPM, "l/mn": _LPM, "L/mn": _LPM, "lpm": _LPM, "LPM": _LPM, "m3/s": 1.0, "L/s": 1e-3,
     "l/s": 1e-3, "cm3/s": 1e-6, "cc/s": 1e-6, "mL/s": 1e-6, "mm3/s": 1e-9, "m3/h": 1 / 3600.0, "m3/min": 1 / 60.0,
     "L/h": 1e-3 / 3600.0, "l/h": 1e-3 / 3600.0, "mL/min": 1e-6 / 60.0, "ml/min": 1e-6 / 60.0, "cm3/min": 1e-6 / 60.0,
-    "cc/min": 1e-6 / 60.0, "gal/min": _GALLON / 60.0, "gpm": _GALLON / 60.0,
+    "cc/min": 1e-6 / 60.0, "gal/min": _GALLON / 60.0, "gpm": _GALLON / 60.0, "GPM": _GALLON / 60.0,
+    "in3/s": _INCH**3, "in3/min": _INCH**3 / 60.0, "ft3/s": _FOOT**3, "ft3/min": _FOOT**3 / 60.0,
 }  # fmt: skip
 _PER_REV = 1.0 / (2.0 * math.pi)
 _DISPLACEMENT_UNITS = {
     "cc/rev": 1e-6 * _PER_REV, "cm3/rev": 1e-6 * _PER_REV, "m3/rad": 1.0, "mL/rev": 1e-6 * _PER_REV,
     "L/rev": 1e-3 * _PER_REV, "cm3/rad": 1e-6, "cc/rad": 1e-6, "mm3/rad": 1e-9, "mm3/rev": 1e-9 * _PER_REV,
-    "m3/rev": _PER_REV, "mm3/deg": 1e-9 * 180.0 / math.pi,
+    "m3/rev": _PER_REV, "mm3/deg": 1e-9 * 180.0 / math.pi, "in3/rev": _INCH**3 * _PER_REV,
+    "in3/rad": _INCH**3,
 }  # fmt: skip
 
 ratio = _quantity("ratio", "1", NO_DIMS, 1.0, {"": 1.0, "1": 1.0, "%": 1e-2, "-": 1.0, "ppm": 1e-6})
-pressure = _quantity("pressure", "Pa", (1, -1, -2, 0), _BAR, _PRESSURE_UNITS)
+pressure = _quantity(
+    "pressure", "Pa", (1, -1, -2, 0), _BAR, {**_PRESSURE_UNITS, **_GAUGE_UNITS, **_ABSOLUTE_UNITS},
+    **dict.fromkeys(_ABSOLUTE_UNITS, -ATMOSPHERE),
+)  # fmt: skip
 pressure_difference = _quantity("pressure_difference", "Pa", (1, -1, -2, 0), _BAR, _PRESSURE_UNITS)
 flow = _quantity("flow", "m^3/s", (0, 3, -1, 0), _LPM, _FLOW_UNITS)
 volume = _quantity("volume", "m^3", (0, 3, 0, 0), 1e-6, _VOLUME_UNITS)
@@ -195,13 +233,18 @@ speed = _quantity(
 )  # fmt: skip
 velocity = _quantity(
     "velocity", "m/s", (0, 1, -1, 0), 1e-2,
-    {"m/s": 1.0, "mm/s": 1e-3, "cm/s": 1e-2, "um/s": 1e-6, "m/min": 1 / 60.0, "mm/min": 1e-3 / 60.0, "km/h": 1 / 3.6},
+    {"m/s": 1.0, "mm/s": 1e-3, "cm/s": 1e-2, "um/s": 1e-6, "m/min": 1 / 60.0, "mm/min": 1e-3 / 60.0, "km/h": 1 / 3.6,
+     "in/s": _INCH, "ft/s": _FOOT, "in/min": _INCH / 60.0, "ft/min": _FOOT / 60.0},
 )  # fmt: skip
-acceleration = _quantity("acceleration", "m/s^2", (0, 1, -2, 0), 1.0, {"m/s2": 1.0, "mm/s2": 1e-3})
-mass = _quantity("mass", "kg", (1, 0, 0, 0), 1.0, {"kg": 1.0, "g": 1e-3, "mg": 1e-6, "t": 1e3})
-inertia = _quantity(
-    "inertia", "kg m^2", (1, 2, 0, 0), 1e-3, {"kg m2": 1.0, "kg cm2": 1e-4, "g mm2": 1e-9, "kg mm2": 1e-6}
+acceleration = _quantity("acceleration", "m/s^2", (0, 1, -2, 0), 1.0, {"m/s2": 1.0, "mm/s2": 1e-3, "ft/s2": _FOOT})
+mass = _quantity(
+    "mass", "kg", (1, 0, 0, 0), 1.0, {"kg": 1.0, "g": 1e-3, "mg": 1e-6, "t": 1e3, "lb": _POUND, "slug": _SLUG}
 )
+inertia = _quantity(
+    "inertia", "kg m^2", (1, 2, 0, 0), 1e-3,
+    {"kg m2": 1.0, "kg cm2": 1e-4, "g mm2": 1e-9, "kg mm2": 1e-6, "lb ft2": _POUND * _FOOT**2,
+     "lb in2": _POUND * _INCH**2, "slug ft2": _SLUG * _FOOT**2},
+)  # fmt: skip
 force = _quantity("force", "N", (1, 1, -2, 0), 1.0, _FORCE_UNITS)
 torque = _quantity("torque", "N m", (1, 2, -2, 0), 1.0, _TORQUE_UNITS)
 energy = _quantity(
@@ -211,7 +254,11 @@ power = _quantity(
     "power", "W", (1, 2, -3, 0), 1.0, {"W": 1.0, "kW": 1e3, "MW": 1e6, "mW": 1e-3, "hp": 745.6998715822702}
 )
 density = _quantity(
-    "density", "kg/m^3", (1, -3, 0, 0), 1e3, {"kg/m3": 1.0, "g/cm3": 1e3, "kg/L": 1e3, "kg/l": 1e3, "kg/dm3": 1e3}
+    "density",
+    "kg/m^3",
+    (1, -3, 0, 0),
+    1e3,
+    {"kg/m3": 1.0, "g/cm3": 1e3, "kg/L": 1e3, "kg/l": 1e3, "kg/dm3": 1e3, "lb/ft3": _POUND / _FOOT**3},
 )
 kinematic_viscosity = _quantity(
     "kinematic_viscosity", "m^2/s", (0, 2, -1, 0), 1e-6, {"cSt": 1e-6, "m2/s": 1.0, "mm2/s": 1e-6, "St": 1e-4}
@@ -220,10 +267,19 @@ dynamic_viscosity = _quantity(
     "dynamic_viscosity", "Pa s", (1, -1, -1, 0), 1e-3, {"mPa s": 1e-3, "Pa s": 1.0, "cP": 1e-3, "P": 0.1, "N s/m2": 1.0}
 )
 temperature = _quantity(
-    "temperature", "K", (0, 0, 0, 1), 1.0, {"degC": 1.0, "K": 1.0, "°C": 1.0}, **{"degC": 273.15, "°C": 273.15}
+    "temperature",
+    "K",
+    (0, 0, 0, 1),
+    1.0,
+    {"degC": 1.0, "K": 1.0, "°C": 1.0, "degF": 5 / 9, "°F": 5 / 9},
+    **{"degC": 273.15, "°C": 273.15, "degF": 459.67 * 5 / 9, "°F": 459.67 * 5 / 9},
 )
 stiffness = _quantity(
-    "stiffness", "N/m", (1, 0, -2, 0), 1e3, {"N/mm": 1e3, "N/m": 1.0, "kN/m": 1e3, "N/um": 1e6, "kN/mm": 1e6}
+    "stiffness",
+    "N/m",
+    (1, 0, -2, 0),
+    1e3,
+    {"N/mm": 1e3, "N/m": 1.0, "kN/m": 1e3, "N/um": 1e6, "kN/mm": 1e6, "lbf/in": _POUND_FORCE / _INCH},
 )
 damping = _quantity(
     "damping", "N s/m", (1, 0, -1, 0), 1.0,
@@ -308,7 +364,7 @@ def quantity_of(annotation: Any) -> Quantity:
     for extra in getattr(annotation, "__metadata__", ()):
         if isinstance(extra, Quantity):
             return extra
-    raise TypeError(f"{annotation!r} is not a quantity type; use one of crescentlab.units, for example Pressure")
+    raise ComponentError(f"{annotation!r} is not a quantity type; use one of crescentlab.units, for example Pressure")
 
 
 def quantity_named(name: str) -> Quantity:
@@ -324,12 +380,20 @@ def parse_any(text: str) -> tuple[float, Quantity]:
     key = normalise(unit)
     owners = [q for q in QUANTITIES.values() if key in q.units]
     if not owners:
-        known = [u for q in QUANTITIES.values() for u in q.units if u]
-        raise UnitError(
-            f"{text!r}: unknown unit {unit!r}: {nearest(key, known, otherwise=f'units are {COMMON} and the like')}"
-        )
+        near = nearest_unit(key, {u: 0 for q in QUANTITIES.values() for u in q.units})
+        raise UnitError(f"{text!r}: unknown unit {unit!r}: {near or f'units are {COMMON} and the like'}")
     owner = speed if speed in owners else owners[0]  # 1/min is a speed, not a frequency
     return owner.parse(text), owner
+
+
+def gauge_of(text: str) -> list[str]:
+    """What each absolute pressure written in a text is as a gauge one: ``3 bara is 1.98675 bar``."""
+    units_ = "|".join(_ABSOLUTE_UNITS)
+    found = re.findall(rf"(?<![\w.])([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)\s*({units_})\b", text)
+    return [
+        f"{number} {unit} is {pressure.show(pressure.parse(f'{number} {unit}'), unit.removesuffix('a'), 6)}"
+        for number, unit in found
+    ]
 
 
 def is_number(text: str) -> bool:
@@ -357,3 +421,10 @@ def quantity_with(dims: Dims) -> Quantity:
             return candidate
     unit = si_unit(dims)
     return Quantity(unit, unit, dims, {normalise(unit): 1.0})
+
+
+def quantity_of_si(si: str) -> Quantity:
+    """The quantity that a file's SI unit belongs to; one with a display unit before others."""
+    known = [q for q in QUANTITIES.values() if q.si == si]
+    shown = [q for q in known if q.name in DISPLAY]
+    return (shown or known or [ratio if si in ("", "1") else Quantity(si, si, (0, 0, 0, 0), {})])[0]

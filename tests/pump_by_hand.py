@@ -1,7 +1,7 @@
 """The crescent pump in closed form, written out again for tests: what it displaces and what leaks, in the mean.
 
-Numbers of circuits/crescent_pump.yaml (13 and 16 teeth, 34 deg of crescent); flows are means over a pitch of an oil
-without compressibility, pressures those of the volumes in the mean.
+Numbers of circuits/crescent_pump.yaml (13 and 16 teeth, 34 deg of crescent); flows are means over a pitch, of an oil of
+one density as mass flow over that at 0 bar gauge, pressures those of the volumes in the mean.
 """
 
 from __future__ import annotations
@@ -23,26 +23,27 @@ ROOT_GAP, ROOT_TOOTH, MEAN_TOOTH, FACE = 2.391 * MM, 8.218 * MM, 6.24 * MM, 0.75
 
 @dataclass(frozen=True)
 class Oil:
-    """Density [kg/m^3], kinematic viscosity [m^2/s]."""
+    """Density where it is and at 0 bar gauge [kg/m^3], kinematic viscosity [m^2/s]."""
 
     rho: float
+    rho_0: float
     nu: float
 
     @property
-    def mu(self) -> float:
-        """Dynamic viscosity [Pa s]."""
-        return self.rho * self.nu
+    def ratio(self) -> float:
+        """Flow, as mass flow over rho_0, of a volume flow of this oil [-]."""
+        return self.rho / self.rho_0
 
 
-def slot(width: float, height: float, length: float, mu: float) -> float:
-    """Flow over drop [m^3/(s Pa)] of a flat slot: b h^3/(12 mu l)."""
-    return width * height**3 / (12 * mu * length)
+def slot(width: float, height: float, length: float, oil: Oil) -> float:
+    """Flow over drop [m^3/(s Pa)] of a flat slot: the mass flow b h^3/(12 nu l) dp, over rho_0."""
+    return width * height**3 / (12 * oil.nu * length) / oil.rho_0
 
 
 def orifice(drop: float, area: float, d_h: float, oil: Oil, cd_max: float = 0.7, lambda_c: float = 100.0) -> float:
-    """Flow [m^3/s] by Eqs. 27 to 29, backwards with a negative drop."""
-    v = math.sqrt(2 * abs(drop) / oil.rho)
-    return math.copysign(cd_max * math.tanh(2 * d_h * v / oil.nu / lambda_c) * area * v, drop)
+    """Flow [m^3/s] by Eqs. 27 to 29, the mass flow C_d A sqrt(2 rho dp) over rho_0, backwards with a negative drop."""
+    discharge = cd_max * math.tanh(2 * d_h * math.sqrt(2 * abs(drop) / oil.rho) / oil.nu / lambda_c)
+    return math.copysign(discharge * area * math.sqrt(2 * oil.rho * abs(drop)), drop) / oil.rho_0
 
 
 def deflection(p: float) -> float:
@@ -67,8 +68,8 @@ def tips(p: float, p_s: float, rpm: float, oil: Oil) -> float:
     total = 0.0
     for radius, length, ratio in ((29.1, 2.149, 1.0), (28.6, 2.478, 13 / 16)):
         share = 34 * 13 / 360 / ratio**2 - 1  # contacts of the driven gear: 34 (16/13)/22.5, as in the circuit
-        drag = TIP * H * radius * MM * ratio * rpm * math.pi / 30 / 2
-        total += slot(H, TIP, length * MM, oil.mu) * (p - p_s) * (1 - share / 2) - drag
+        drag = TIP * H * radius * MM * ratio * rpm * math.pi / 30 / 2 * oil.ratio
+        total += slot(H, TIP, length * MM, oil) * (p - p_s) * (1 - share / 2) - drag
     return total
 
 
@@ -79,14 +80,14 @@ def axial(p: float, p_s: float, rpm: float, oil: Oil) -> float:
     volume squeezes 3.975 mm^3 a pitch into it.
     """
     dh = deflection(p)
-    cover = 5 * (slot(ROOT_GAP, dh, 3.5 * MM, oil.mu) + slot(MEAN_TOOTH, 0.75 * dh, FACE, oil.mu)) * p
-    faces = slot(ROOT_TOOTH, AXIAL, 3 * MM, oil.mu)
-    collar = math.pi * 35 * MM * (40 * UM) ** 3 * (1 + 1.5 * 0.95**2) / (12 * oil.mu * 8 * MM)
+    cover = 5 * (slot(ROOT_GAP, dh, 3.5 * MM, oil) + slot(MEAN_TOOTH, 0.75 * dh, FACE, oil)) * p
+    faces = slot(ROOT_TOOTH, AXIAL, 3 * MM, oil)
+    collar = slot(math.pi * 35 * MM * (1 + 1.5 * 0.95**2), 40 * UM, 8 * MM, oil)
 
     def passed(drop: float) -> float:
         return 5 * (orifice(drop, AXIAL * ROOT_GAP, 2 * AXIAL, oil) + faces * drop)
 
-    squeezed = 3.975e-9 * 13 * rpm / 60
+    squeezed = 3.975e-9 * 13 * rpm / 60 * oil.ratio
     chamfer = brentq(lambda x: passed(p - x) + squeezed - passed(x - p_s) - collar * x, p_s, p + 1e5)
     return cover + passed(p - chamfer)
 
@@ -94,13 +95,8 @@ def axial(p: float, p_s: float, rpm: float, oil: Oil) -> float:
 def leakage(p: float, rpm: float, oil: Oil) -> float:
     """What leaves the delivery volume through gaps [m^3/s], relief valve closed."""
     p_s = suction_pressure(rpm, oil)
-    ring = slot(H, 278 * UM, 40 * MM, oil.mu) * (p - p_s)
+    ring = slot(H, 278 * UM, 40 * MM, oil) * (p - p_s)
     return tips(p, p_s, rpm, oil) + ring + axial(p, p_s, rpm, oil)
-
-
-def delivered(p: float, rpm: float, oil: Oil) -> float:
-    """Into the delivery line [m^3/s] at the mean delivery pressure."""
-    return PER_TURN * rpm / 60 - leakage(p, rpm, oil)
 
 
 def churchill(reynolds: float) -> float:
@@ -111,5 +107,5 @@ def churchill(reynolds: float) -> float:
 
 def pipe_loss(q: float, diameter: float, length: float, coefficient: float, oil: Oil) -> float:
     """Pressure drop [Pa] of a pipe, Darcy and Weisbach."""
-    v = q / (math.pi / 4 * diameter**2)
+    v = q / oil.ratio / (math.pi / 4 * diameter**2)
     return (churchill(v * diameter / oil.nu) * length / diameter + coefficient) * oil.rho / 2 * v * v

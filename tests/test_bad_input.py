@@ -183,9 +183,12 @@ VALUES = {
         ("volume: 70 cm^3, start: {p: 1 bar}}", "start: {p: 1 bar}} <--"),
         "write for example volume: 1 cm3",
     ),
-    "missing unit": (("5 mm^2}", "5} <--"), "hole.area: '5': an area needs a unit; write for example 5 mm2"),
+    "missing unit": (("5 mm^2}", "5} <--"), "hole.area: '5': an area needs a unit: 5 m2, 50000 cm2 or 5e+06 mm2?"),
     "wrong dimension": (("5 mm^2}", "5 bar} <--"), "'bar' is a unit of pressure, not of area"),
-    "unknown unit": (("5 mm^2}", "5 mmm} <--"), "unknown unit 'mmm' for an area; write one of mm2, m2, cm2, in2"),
+    "unknown unit": (
+        ("5 mm^2}", "5 mmm} <--"),
+        "unknown unit 'mmm' for an area: did you mean mm2? Write one of mm2, m2",
+    ),
     "unknown unit of a parameter": (
         ("30 L/min", "30 l/mim <--"),
         "supply: '30 l/mim': unknown unit 'l/mim': did you mean l/min",
@@ -270,7 +273,7 @@ SETTINGS = {
     "negative stop": ("simulation: {stop: -1 ms} <--", "simulation.stop must be above 0, not -1 ms"),
     "stop without unit": (
         "simulation: {stop: 10} <--",
-        "simulation.stop: '10': a time needs a unit; write for example 10 ms",
+        "simulation.stop: '10': a time needs a unit: 10 s, 10000 ms or 1e+07 us?",
     ),
     "tolerance of 2": ("simulation: {rtol: 2} <--", "simulation.rtol must be below 1, not '2'"),
     "tolerance nan": ("simulation: {rtol: nan} <--", "simulation.rtol must be"),
@@ -294,7 +297,10 @@ SETTINGS = {
         "display: {pressure: mm} <--",
         "display.pressure: 'mm' is a unit of length, not of pressure",
     ),
-    "display in no unit": ("display: {pressure: baar} <--", "unknown unit 'baar' for a pressure; write one of bar, Pa"),
+    "display in no unit": (
+        "display: {pressure: baar} <--",
+        "unknown unit 'baar' for a pressure: did you mean bar or mbar",
+    ),
     "plot of no variable": ("plots: [{y: lin.p}] <--", "plots: no variable 'lin.p': did you mean line.p"),
     "plot over no variable": ("plots: [{y: line.p, x: lin.p}] <--", "plots: no variable 'lin.p': did you mean line.p"),
     "plot of no element": ("plots: [{y: 'line.p[1]'}] <--", "line.p[1]: line.p is a single value; write line.p"),

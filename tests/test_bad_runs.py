@@ -30,7 +30,7 @@ SETTINGS = {
         ["supply=1 bar"],
         "--set supply: '1 bar': 'bar' is a unit of pressure, not of flow; write one of L/min",
     ),
-    "no unit": (["supply=1"], "--set supply: '1': a flow needs a unit; write for example 1 L/min"),
+    "no unit": (["supply=1"], "--set supply: '1': a flow needs a unit: 1 m3/s, 1000 L/s or 60000 L/min?"),
     "unknown unit": (["supply=1 mm/foo"], "unknown unit 'mm/foo' for a flow"),
     "a word": (["supply=much"], "--set supply: 'much' is not a number with a unit; write for example 1 L/min"),
     "another unit of a component": (["hole.area=1 bar"], "--set hole.area: '1 bar': 'bar' is a unit of pressure"),
@@ -111,6 +111,18 @@ def test_failing_runs(refused: Refusal, law: str, said: str, end: float) -> None
         assert saved.attrs["complete"] == 0
         assert saved.attrs["error"] == err.strip()
         assert float(saved.time[-1]) == pytest.approx(end, rel=0.02)
+
+
+@pytest.mark.parametrize("solver", ["auto", "lsoda", "bdf", "radau", "rk45", "dop853", "rodas", "dopri"])
+def test_advice_never_names_the_solver_in_use(solver: str, refused: Refusal) -> None:
+    """x' = -1/x ends where x = sqrt(1 - 2 t) meets zero, whatever integrates."""
+    refused.write({"c.yaml": PART, "mine.py": f'{HEAD}"der_x": -1 / x}}\n'})
+    for rtol in ("1e-6", "1e-9"):
+        code, _, err = refused.run("simulate", "c.yaml", "--quiet", "-o", "none", "--solver", solver, "--rtol", rtol)
+        named = re.search(r"a\.x limits it; try --solver (\w+),", err)
+        assert code == 3
+        assert named, err
+        assert named[1] in {"rodas", "radau", "lsoda"} - {solver}
 
 
 SUCKED = f"""\

@@ -5,6 +5,7 @@ from __future__ import annotations
 import inspect
 import re
 from collections.abc import Callable
+from pathlib import Path
 
 import pytest
 from pydantic import BeforeValidator
@@ -38,6 +39,7 @@ FLUIDS = {
     },
 }  # fmt: skip
 SETTINGS: dict[str, dict[str, object]] = {
+    "recorded_signal": {"file": str(Path(__file__).parent / "recorded.csv")},
     "table": {"curve": Curve(x=(0.0, 1.0, 3.0), y=(0.0, 2.0, 1.0))},
     "time_table": {"curve": Curve(x=(0.0, 1.0, 3.0), y=(0.0, 2.0, 1.0), x_quantity="time")},
     "compliant_capacity": {
@@ -179,7 +181,7 @@ OF_ANY_SIGN = {
     "flow", "force", "free_length", "gap", "high", "jet_coefficient", "low", "mean_pressure", "numerator", "overlap",
     "phase", "position", "preload", "pressure", "seat_position", "share", "speed", "start_angle", "start_flow",
     "start_phase", "start_pressure", "suction_closes", "suction_opens", "surface_pressure", "torque", "velocity",
-    "weights",
+    "weights", "offset",
 }  # fmt: skip
 """Positions, angles, gauge pressures, imposed values and starts, which may be anything."""
 

@@ -9,6 +9,7 @@ from crescentlab.components.carry_over import CarryOverChain
 from crescentlab.components.external_gears import ExternalGears
 from crescentlab.components.fluids import SimpleOil
 from pydantic import ValidationError
+from scipy.optimize import brentq
 
 import crescentlab as cl
 from crescentlab.analysis.outcome import Outcome, Window
@@ -146,13 +147,25 @@ def test_header_of_the_external_gear_pump():
     assert value(run, "mean(gears.displacement)") * 2 * math.pi == pytest.approx(13.88e-6, abs=5e-9)
     uneven = value(run, "peak_to_peak(gears.dVd) / mean(gears.dVd)")
     assert abs(uneven) == pytest.approx(0.1775, abs=1e-4)
-    assert value(run, "mean(delivery.p)") == pytest.approx(147 * BAR, abs=0.5 * BAR)
-    assert value(run, "minimum(delivery.p)") == pytest.approx(141 * BAR, abs=0.5 * BAR)
-    assert value(run, "maximum(delivery.p)") == pytest.approx(152.4 * BAR, abs=0.5 * BAR)
+    assert value(run, "mean(delivery.p)") == pytest.approx(145.5 * BAR, abs=0.05 * BAR)
+    assert value(run, "minimum(delivery.p)") == pytest.approx(139 * BAR, abs=0.5 * BAR)
+    assert value(run, "maximum(delivery.p)") == pytest.approx(151 * BAR, abs=0.5 * BAR)
     assert value(run, "mean(throttle.q)") == pytest.approx(20.5 * LPM, abs=0.05 * LPM)
     assert value(run, "mean(volumetric_efficiency)") == pytest.approx(0.986, abs=5e-4)
-    assert value(run, "mean(gears.torque)") == pytest.approx(32.5, abs=0.05)
+    assert value(run, "mean(gears.torque)") == pytest.approx(32.2, abs=0.05)
     assert value(run, "mean(leakage)") == pytest.approx(0.52 * LPM, abs=0.005 * LPM)
+
+
+def test_pressure_at_which_the_throttle_takes_what_the_gears_bring():
+    """Cd A sqrt(2 rho p)/rho_0, rho at p/2, is rho(p)/rho_0 D w less the tips' net flow; 1e-3 for the ripple."""
+    run = last_turn("40 um")
+    brought = 13.88e-6 * 25
+
+    def surplus(p):
+        taken = 0.7 * 2.65e-6 * math.sqrt(2 * p * 860 * math.exp(p / 2.8e9)) / 860
+        return math.exp(p / 1.4e9) * brought - value(run, "mean(leakage)") - taken
+
+    assert value(run, "mean(delivery.p)") == pytest.approx(brentq(surplus, 100 * BAR, 200 * BAR), rel=1e-3)
 
 
 def test_flow_is_displaced_less_what_leaks():
@@ -163,6 +176,18 @@ def test_flow_is_displaced_less_what_leaks():
         displaced = rho * value(run, "mean(gears.displacement)") * 50 * math.pi
         expected = displaced - value(run, "mean(leakage)")
         assert value(run, "mean(throttle.q)") == pytest.approx(expected, rel=1e-3)
+
+
+def test_six_or_seven_spaces_are_carried():
+    """220 deg over a pitch of 30 deg: seven for 10 deg of each pitch, while the housing seals eight tips, six for the
+    other 20 deg. 2e-3: a whole number of pitches, each edge found to 1e-9 of the run and in two rows of one time."""
+    run = cl.load("external_gear_pump").simulate("10 ms")
+    exists = run["driver.exists"]
+    number = exists.sum(axis=1)
+    assert set(number) == {6.0, 7.0}
+    assert np.all(exists[:, :6] == 1)
+    shown = np.trapezoid(number - 6, run.time) / np.ptp(run.time)
+    assert shown == pytest.approx(1 / 3, abs=2e-3)
 
 
 def test_spaces_come_up_to_pressure_step_by_step():

@@ -386,6 +386,31 @@ def test_a_series_over_time_is_fitted_at_its_times(bench, tmp_path):
     assert "the data are a series over time; exact derivatives are those of outcomes" in summary(found)
 
 
+def test_twenty_thousand_rows_cost_what_twenty_do(tmp_path):
+    """The time constant of a lag from a logger's file with decimal commas: sigma of T is s/sqrt(sum (dy/dT)^2).
+
+    Each set of parameters is one run of the circuit, whatever the number of rows.
+    """
+    (tmp_path / "lag.yaml").write_text(
+        "crescentlab: 1\ncomponents:\n  s: {type: step, after: 5 bar}\n"
+        "  lag: {type: first_order_lag, gain: 1 bar, per: 1 bar, time_constant: 100 ms}\n"
+        "nets: {a: [s.y, lag.u]}\n"
+    )
+    t, tau, sigma = np.linspace(0, 2, 20_000), 0.3, 0.02
+    y = 5 * (1 - np.exp(-t / tau)) + sigma * np.random.default_rng(0).standard_normal(t.size)
+    rows = [f"{a:.9f};{b:.6f}".replace(".", ",") for a, b in zip(t, y, strict=True)]
+    (tmp_path / "data.csv").write_text("\n".join(["# logger 7", "time [s];y [bar]", *rows]))
+    (tmp_path / "fit.yaml").write_text(
+        "crescentlab_fit: 1\ncircuit: lag.yaml\ndata: data.csv\nmeasured: {y: lag.y}\nstarts: 1\n"
+        "parameters: {lag.time_constant: {start: 100 ms, low: 10 ms, high: 2 s}}\n"
+    )
+    found = run_fit(read_problem(tmp_path / "fit.yaml"))
+    expected = sigma / math.sqrt(np.sum((5 * t / tau**2 * np.exp(-t / tau)) ** 2))
+    assert found.fitted.errors[0] == pytest.approx(expected, rel=0.03)
+    assert abs(found.fitted.theta[0] - tau) < 4 * expected
+    assert found.runs <= 40
+
+
 def test_rows_of_equal_settings_are_one_run_and_empty_cells_are_left_out(bench):
     data = "drop [bar], leak [L/min], leak sd [L/min]\n1, 2.0, 0.1\n1, 2.2, 0.1\n1, 2.1, 0.1\n4, , \n4, 6.0, 0.2\n"
     problem = bench.problem(f"{{{HOLE}}}", data)

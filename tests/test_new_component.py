@@ -60,13 +60,13 @@ def test_what_is_written_keeps_the_contract(refused: Refusal, given: str, file: 
 
 
 def test_a_circuit_uses_it(refused: Refusal) -> None:
-    """The lines that the command prints do; 0.7 A sqrt(2 dp/rho) at rho of 5 bar, its rounding is 1e-9 here."""
+    """The lines that the command prints do; 0.7 A sqrt(2 rho dp)/rho_0 at rho of 5 bar, its rounding is 1e-9 here."""
     _, out, _ = refused.run("new", "component", "my_valve")
     assert "library: [./my_valve.py]" in out
     assert "{type: my_valve, area: 5 mm^2}" in out
     refused.write({"c.yaml": CIRCUIT})
     flow = cl.load(refused.folder / "c.yaml").simulate()["valve.q"][-1]
-    assert flow == pytest.approx(0.7 * 5e-6 * math.sqrt(2 * 10e5 / (860 * math.exp(5e5 / 1.4e9))), rel=1e-8)
+    assert flow == pytest.approx(0.7 * 5e-6 * math.sqrt(2 * 10e5 * math.exp(5e5 / 1.4e9) / 860), rel=1e-8)
 
 
 def test_the_folder_is_made(refused: Refusal) -> None:

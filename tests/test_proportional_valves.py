@@ -40,7 +40,7 @@ def closed(run: Result) -> None:
 def test_at_a_steady_signal_it_is_a_relief_valve(p: float) -> None:
     """Equation by equation."""
     common: dict[str, Any] = {"area": 20e-6, "opening_range": 20 * BAR}
-    at = {"p_a": p, "p_b": 2 * BAR, "lift": 0.3, "fluid": OIL}
+    at = {"p_a": p, "p_b": 2 * BAR, "lift": 0.3, "at": 0.0, "fluid": OIL}
     set_by_signal = ProportionalReliefValve(**common).equations(setting=100 * BAR, **at)
     assert set_by_signal == ReliefValve(cracking_pressure=100 * BAR, **common).equations(**at)
 
@@ -77,9 +77,9 @@ def test_divider_keeps_nothing(x: float, share: float) -> None:
     """What enters leaves to the last digit; mirrored, it is the divider of the other share."""
     common: dict[str, Any] = {"area": 15e-6, "centring_range": 0.5 * BAR}
     one, other = FlowDivider(share=share, **common), FlowDivider(share=1 - share, **common)
-    got = one.equations(p_inlet=150 * BAR, p_a=100 * BAR, p_b=20 * BAR, stroke=x, fluid=OIL)
+    got = one.equations(p_inlet=150 * BAR, p_a=100 * BAR, p_b=20 * BAR, stroke=x, at=0.0, fluid=OIL)
     assert got["q_inlet"] + (got["q_a"] + got["q_b"]) == 0.0
-    mirror = other.equations(p_inlet=150 * BAR, p_a=20 * BAR, p_b=100 * BAR, stroke=-x, fluid=OIL)
+    mirror = other.equations(p_inlet=150 * BAR, p_a=20 * BAR, p_b=100 * BAR, stroke=-x, at=0.0, fluid=OIL)
     assert got["q_a"] == pytest.approx(mirror["q_b"], rel=1e-12)
     assert got["der_stroke"] == pytest.approx(-mirror["der_stroke"], rel=1e-12)
 
@@ -161,8 +161,8 @@ def test_reversed_flow() -> None:
 def test_combining_mirrors_dividing() -> None:
     """With all drops turned round, all flows are; the spool goes the same way."""
     valve = FlowDivider(area=15e-6, share=0.3, centring_range=50 * BAR, combines=True)
-    there = valve.equations(p_inlet=60 * BAR, p_a=10 * BAR, p_b=30 * BAR, stroke=0.2, fluid=STIFF)
-    back = valve.equations(p_inlet=-60 * BAR, p_a=-10 * BAR, p_b=-30 * BAR, stroke=0.2, fluid=STIFF)
+    there = valve.equations(p_inlet=60 * BAR, p_a=10 * BAR, p_b=30 * BAR, stroke=0.2, at=0.0, fluid=STIFF)
+    back = valve.equations(p_inlet=-60 * BAR, p_a=-10 * BAR, p_b=-30 * BAR, stroke=0.2, at=0.0, fluid=STIFF)
     for port in ("inlet", "a", "b"):
         assert back[f"q_{port}"] == pytest.approx(-there[f"q_{port}"], rel=1e-6)
     assert there["der_stroke"] == pytest.approx(back["der_stroke"], rel=1e-12)
@@ -177,7 +177,7 @@ def test_priority_valve_keeps_nothing(lift: float) -> None:
     """What enters leaves; shut is shut."""
     valve = PriorityValve(area=50e-6, control_pressure=7 * BAR, control_range=2 * BAR)
     got = valve.equations(
-        p_inlet=150 * BAR, p_priority=40 * BAR, p_surplus=3 * BAR, p_load=33 * BAR, lift=lift, fluid=OIL
+        p_inlet=150 * BAR, p_priority=40 * BAR, p_surplus=3 * BAR, p_load=33 * BAR, lift=lift, at=0.0, fluid=OIL
     )
     assert got["q_inlet"] + (got["q_priority"] + got["q_surplus"]) == 0.0
     assert (got["q_surplus"] == 0) == (lift <= 0)

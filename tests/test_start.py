@@ -10,7 +10,7 @@ import pytest
 
 import crescentlab as cl
 from crescentlab.cli import main
-from crescentlab.result import read_series
+from crescentlab.series_files import read_series
 
 BENCH = """
 crescentlab: 1

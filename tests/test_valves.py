@@ -38,31 +38,29 @@ def through(area: float, drop: float) -> float:
 
 
 def test_static_characteristics() -> None:
-    """Openings that the pressures ask for: shut on one side of the range, open on the other, half in its middle."""
+    """Openings that the pressures ask for: shut on one side of the range, open on the other, half in its middle, and
+    as much beyond as the force on the stop is."""
     common = {"area": 10e-6, "time_constant": 1.0}
     relief = ReliefValve(cracking_pressure=100 * BAR, opening_range=20 * BAR, **common)
     reducing = ReducingValve(set_pressure=50 * BAR, closing_range=10 * BAR, **common)
     compensator = PressureCompensator(control_pressure=8 * BAR, closing_range=2 * BAR, **common)
-    for excess, share in ((-5, 0.0), (0, 0.0), (0.5, 0.5), (1, 1.0), (5, 1.0)):
-        got = relief.equations(p_a=(100 + 20 * excess) * BAR, p_b=0.0, lift=0.0, fluid=OIL)["der_lift"]
+    free = {"lift": 0.0, "at": 0.0, "fluid": OIL}
+    for share in (-5, 0, 0.5, 1, 5):
+        got = relief.equations(p_a=(100 + 20 * share) * BAR, p_b=0.0, **free)["der_lift"]
         assert got == pytest.approx(share, abs=1e-12)
-        got = reducing.equations(p_a=200 * BAR, p_b=(53 - 10 * excess) * BAR, p_drain=3 * BAR, lift=0.0, fluid=OIL)[
-            "der_lift"
-        ]
+        got = reducing.equations(p_a=200 * BAR, p_b=(53 - 10 * share) * BAR, p_drain=3 * BAR, **free)["der_lift"]
         assert got == pytest.approx(share, abs=1e-12)
-        got = compensator.equations(p_a=200 * BAR, p_b=(70 - 2 * excess) * BAR, p_load=60 * BAR, lift=0.0, fluid=OIL)[
-            "der_lift"
-        ]
+        got = compensator.equations(p_a=200 * BAR, p_b=(70 - 2 * share) * BAR, p_load=60 * BAR, **free)["der_lift"]
         assert got == pytest.approx(share, abs=1e-12)
 
 
 def test_sequence_valve_does_not_see_its_outlet() -> None:
-    """Opened by pilot less drain alone: shut up to 100 bar, half open at 110 bar, whatever the outlet's pressure."""
+    """Moved by pilot less drain alone: shut up to 100 bar, half open at 110 bar, whatever the outlet's pressure."""
     valve = SequenceValve(area=10e-6, set_pressure=100 * BAR, opening_range=20 * BAR, time_constant=1.0)
     for p_b in (0, 60, 300):
-        for pilot, drain, share in ((99, 0, 0.0), (100, 0, 0.0), (110, 0, 0.5), (113, 3, 0.5), (120, 0, 1.0)):
+        for pilot, drain, share in ((99, 0, -0.05), (100, 0, 0.0), (110, 0, 0.5), (113, 3, 0.5), (120, 0, 1.0)):
             got = valve.equations(
-                p_a=150 * BAR, p_b=p_b * BAR, p_pilot=pilot * BAR, p_drain=drain * BAR, lift=0.0, fluid=OIL
+                p_a=150 * BAR, p_b=p_b * BAR, p_pilot=pilot * BAR, p_drain=drain * BAR, lift=0.0, at=0.0, fluid=OIL
             )
             assert got["der_lift"] == pytest.approx(share, abs=1e-12)
             assert got["q"] == 0.0
@@ -100,31 +98,38 @@ def test_bypass_compensator_follows_the_load() -> None:
     """Shut while the drop over the metering edge is below 8 bar, half open at 9, open at 10, at any load and tank."""
     valve = BypassCompensator(area=10e-6, control_pressure=8 * BAR, opening_range=2 * BAR, time_constant=1.0)
     for load in (0, 50, 300):
-        for drop, share in ((-5, 0.0), (8, 0.0), (9, 0.5), (10, 1.0), (50, 1.0)):
-            got = valve.equations(p_a=(load + drop) * BAR, p_b=4 * BAR, p_load=load * BAR, lift=0.0, fluid=OIL)
+        for drop, share in ((-5, -6.5), (8, 0.0), (9, 0.5), (10, 1.0), (50, 21.0)):
+            got = valve.equations(p_a=(load + drop) * BAR, p_b=4 * BAR, p_load=load * BAR, lift=0.0, at=0.0, fluid=OIL)
             assert got["der_lift"] == pytest.approx(share, abs=1e-12)
 
 
 def test_reducing_relieving_valve_in_its_dead_band() -> None:
-    """Feeds below 50 bar, nothing from there to 53 bar, relieves above; what enters leaves."""
+    """Feeds below 50 bar, nothing from there to 53 bar, an overlap of 0.3 travels, relieves above; what enters leaves.
+
+    Half open to the tank at 58 bar, fully at 63 bar. Pressures over 1 bar of the tank.
+    """
     valve = ReducingRelievingValve(
         area=10e-6, set_pressure=50 * BAR, closing_range=10 * BAR, dead_band=3 * BAR, time_constant=1.0
     )
     common = {"p_supply": 200 * BAR, "p_tank": 1 * BAR, "fluid": OIL}
-    for p, stroke in ((30, 1.0), (46, 0.5), (51, 0.0), (54, 0.0), (59, -0.5), (80, -1.0)):
-        got = valve.equations(p_outlet=p * BAR, stroke=0.0, **common)
-        assert got["der_stroke"] == pytest.approx(stroke, abs=1e-12)
-        there = valve.equations(p_outlet=p * BAR, stroke=stroke, **common)
+    for p, asked, stroke, share in (
+        (30, 2.1, 1.0, 1.0), (46, 0.5, 0.5, 0.5), (51, 0.0, 0.0, 0.0), (53, -0.2, -0.2, 0.0), (59, -0.8, -0.8, -0.5),
+        (64, -1.3, -1.3, -1.0), (80, -2.9, -1.3, -1.0),
+    ):  # fmt: skip
+        got = valve.equations(p_outlet=p * BAR, stroke=0.0, at=0.0, **common)
+        assert got["der_stroke"] == pytest.approx(asked, abs=1e-12)
+        there = valve.equations(p_outlet=p * BAR, stroke=stroke, at=0.0, **common)
+        full = valve.equations(p_outlet=p * BAR, stroke=1.0 if share > 0 else -1.3, at=0.0, **common)
         assert there["q_supply"] + there["q_outlet"] + there["q_tank"] == pytest.approx(0.0, abs=1e-18)
-        assert (there["q_in"] > 0) == (stroke > 0)
-        assert (there["q_out"] > 0) == (stroke < 0)
+        assert there["q_in"] == pytest.approx(max(share, 0.0) * full["q_in"], rel=1e-9)
+        assert there["q_out"] == pytest.approx(max(-share, 0.0) * full["q_out"], rel=1e-9)
 
 
 def test_counterbalance_valve_without_pilot_is_a_relief_valve() -> None:
     """Its load pressure alone opens it from the set pressure on; the back pressure adds 1 + R times itself."""
     valve = CounterbalanceValve(area=10e-6, set_pressure=70 * BAR, opening_range=30 * BAR, time_constant=1.0)
-    for p_a, p_b, share in ((69, 0, 0.0), (85, 0, 0.5), (120, 0, 1.0), (85, 3, 0.1)):
-        got = valve.equations(p_a=p_a * BAR, p_b=p_b * BAR, p_pilot=0.0, lift=0.0, fluid=OIL)["der_lift"]
+    for p_a, p_b, share in ((67, 0, -0.1), (85, 0, 0.5), (130, 0, 2.0), (85, 3, 0.1)):
+        got = valve.equations(p_a=p_a * BAR, p_b=p_b * BAR, p_pilot=0.0, lift=0.0, at=0.0, fluid=OIL)["der_lift"]
         assert got == pytest.approx(share, abs=1e-12)
 
 
@@ -231,7 +236,7 @@ def test_rectifier_of_ideal_check_valves() -> None:
     """Four in a bridge turn a flow that swings round into one that does not: |q| at every instant."""
     valve = IdealCheckValve()
     for drop in (-3 * BAR, -1.0, 0.0, 1.0, 3 * BAR):
-        there = valve.equations(p_a=drop, p_b=0.0)["q"]
-        back = valve.equations(p_a=0.0, p_b=drop)["q"]
-        assert there + back == pytest.approx(1e-7 * abs(drop), rel=1e-12)
+        there = valve.equations(p_a=drop, p_b=0.0, fluid=STIFF)["q"]
+        back = valve.equations(p_a=0.0, p_b=drop, fluid=STIFF)["q"]
+        assert there + back == pytest.approx(1e-7 * abs(drop), rel=1e-9)
         assert min(there, back) == 0.0

@@ -4,7 +4,7 @@ Same equations, states and held values as the assembled circuit, in SI; symbols 
 What makes it fast, none of it an approximation beyond rounding:
 
 - only what lives is computed: the trapped volume, the chains' volumes and the spool have flags, closed gaps no code;
-- viscosity is constant, so a gap's flow is K v(p) dp with v = rho_l/rho, and everything else is in K;
+- kinematic viscosity is constant, so a gap's mass flow is K dp, whatever the density;
 - the oil law is evaluated for all pressures at once, in loops the compiler turns into vector code;
 - volumes and the waves arriving at the line's ends depend on time alone, so all stages of a step share one loop;
 - the Jacobian is written out beside the flows, sharing their terms; constants fold at compile time;
@@ -173,7 +173,7 @@ typedef struct {
 
 static const double BORE = M_PI / 4 * SQR(LINE_DIAMETER), DX = LINE_LENGTH / CELLS;
 #define SWELL (RHO_0 / LIQUID_DENSITY)      /* rho_0/rho = SWELL v */
-#define ENTRY_LOSS (LINE_LOSS * RHO_0 / (2 * BORE * BORE))
+#define ENTRY_LOSS (LINE_LOSS * RHO_0 * SWELL / (2 * BORE * BORE))   /* times v at the end: K rho v^2/2 over q^2 */
 #define IMPEDANCE (RHO_0 / (BORE * sqrt(LIQUID_DENSITY)))           /* Z = IMPEDANCE v / sqrt(-v') */
 #define LINE_RE (RHO_0 * LINE_DIAMETER / (BORE * LIQUID_DENSITY * VISCOSITY))
 #define LINE_FRICTION (VISCOSITY * RHO_0 / (2 * SQR(LINE_DIAMETER) * BORE))
@@ -246,27 +246,38 @@ INLINE void set_clock(const Pump *u, int slots, const double *t, Clock *c)
 
 typedef struct { double q, a, b; } Flow;    /* flow from a to b and its derivatives to the two pressures */
 
-INLINE Flow slot(double K, double v, double v1, double drop)
+/* All flows are mass flow over rho_0. */
+INLINE Flow slot(double K, double drop)
 {
-    return (Flow){K * v * drop, K * (v + v1 / 2 * drop), K * (v1 / 2 * drop - v)};
+    return (Flow){K * drop, K, -K};
 }
 
-/* K of a slot: n b h^3/(12 nu rho_l l). */
+/* A slot with a wall that drags the volume `drag` from b to a, of the oil v between. */
+INLINE Flow tip(double K, double drag, double v, double v1, double drop)
+{
+    const double dragged = drag / (SWELL * v), thin = dragged * v1 / (2 * v);
+    return (Flow){K * drop - dragged, K + thin, thin - K};
+}
+
+/* K of a slot: n b h^3/(12 nu rho_0 l). */
 #define SLOT(parallel, width, height, length) \
-    ((parallel) * (width) * (height) * (height) * (height) / (12 * VISCOSITY * LIQUID_DENSITY * (length)))
+    ((parallel) * (width) * (height) * (height) * (height) / (12 * VISCOSITY * RHO_0 * (length)))
 
 enum { O_2, O_2S, O_3, O_5, O_INLET, O_THROTTLE, O_HOLES, ORIFICES = WIDE };
 
-/* Orifices: with u = 2 dp/rho and r^2 = k^2 |u|, k = 2 d_h/(nu lambda_c): q = c u tanh(r)/r, and dq/du. */
-INLINE void orifices(Wide c, Wide k2, Wide u, double *q, double *du, double *shape)
+/* Orifices: with u = 2 dp/rho, w = 2 dp/rho_0 and r^2 = k^2 |u|, k = 2 d_h/(nu lambda_c): q = c w tanh(r)/r, and what it
+changes by per w at constant density, and per relative change of 1/rho. */
+INLINE void orifices(Wide c, Wide k2, Wide u, Wide w, double *q, double *dw, double *dv, double *shape)
 {
     const Wide s = k2 * magnitude(u), r = root(choose(s > 1e-3, s, all(1e-3)));
     const Wide e = exp_wide(-2.0 * choose(r < 40, r, all(40)));
     const Wide series = 1.0 - s * (1.0 / 3 - s * (2.0 / 15 - s * (17.0 / 315)));
     const Wide T = choose(s < 1e-3, series, (1.0 - e) / ((1.0 + e) * r));
     store(shape, T);
-    store(q, c * u * T);
-    store(du, c * (T + 1.0 - s * T * T) * 0.5);
+    const Wide D = (T + 1.0 - s * T * T) * 0.5;
+    store(q, c * w * T);
+    store(dw, c * D);
+    store(dv, c * w * (D - T));
 }
 #define ORIFICE_K(d_h, lambda_c) (2 * (d_h) / (VISCOSITY * (lambda_c)))
 #define ORIFICE_C(area, cd, k) ((area) * (cd) * (k))
@@ -294,19 +305,20 @@ INLINE double deflection(const Pump *u, double p, double *slope)
     return COVER_HEIGHT[u->piece] + *slope * (p - COVER_KNOT[u->piece]);
 }
 
-/* Flow into the line at an end at pressure p, oil v, v', v'' there; derivatives to p and to time. */
+/* Flow into the line at an end at pressure p, oil v, v', v'' there; derivatives to p and to time. `entry` is the loss
+over q^2 and v. */
 typedef struct { double q, p, t; } End;
-INLINE End line_end(const Clock *c, int lane, double loss, double p, double v, double v1, double v2, int order)
+INLINE End line_end(const Clock *c, int lane, double entry, double p, double v, double v1, double v2, int order)
 {
     double Zp = IMPEDANCE * v * sqrt(-1 / v1), Z = (c->zf[lane] + Zp) / 2, qf = c->qf[lane];
-    double drive = p - c->pw[lane] + Z * qf;
+    double drive = p - c->pw[lane] + Z * qf, loss = entry * v;
     double S = loss ? sqrt(Z * Z + 4 * loss * fabs(drive)) : Z, over = 1 / (Z + S);
     End e = {2 * drive * over, 0, 0};
     if (order) {
         double dZ = Zp * (v1 / v - v2 / (2 * v1)) / 2, dD = 1 + dZ * qf;
         double tZ = c->dzf[lane] / 2, tD = tZ * qf + Z * c->dqf[lane] - c->dpw[lane];
         double kind = 2 * loss * (drive > 0 ? 1 : -1);
-        e.p = over * (2 * dD - e.q * (dZ + (Z * dZ + kind * dD) / S));
+        e.p = over * (2 * dD - e.q * (dZ + (Z * dZ + kind * dD + 2 * entry * v1 * fabs(drive)) / S));
         e.t = over * (2 * tD - e.q * (tZ + (Z * tZ + kind * tD) / S));
     }
     return e;
@@ -331,8 +343,8 @@ typedef struct {
 } Jacobian;
 
 enum {  /* pressures at which the oil is wanted: volumes, then means of two */
-    L_D, L_S, L_T, L_A, L_R, L_N, L_C, L_F, L_B, M_D0, M_DA, M_AS, M_TA, M_RA, M_A0, M_DS,
-    M_RS, M_DR, M_NS, M_DN, M_S0, M_B0, M_DC, M_CF, PRESSURES
+    L_D, L_S, L_T, L_A, L_R, L_N, L_C, L_F, L_B, M_DA, M_AS, M_TA, M_RA, M_DS, M_S0, M_B0,
+    M_RS, M_DR, M_NS, M_DN, M_DC, M_CF, PRESSURES = 3 * WIDE
 };
 #define VOLUMES PAD     /* the first lanes, of which slopes are wanted */
 
@@ -361,8 +373,8 @@ INLINE double equations(const Pump *u, const Clock *c, int k, const double *rest
     const double pc = x[PC], pf = x[PF], pb = x[PB];
     LANES(p[PRESSURES]);
     store(p, (Wide){pd, ps, pt, pa, pr, pn, pc, pf});
-    store(p + WIDE, 0.5 * ((Wide){pb, pd, pd, pa, pt, pr, pa, pd} + (Wide){pb, 0, pa, ps, pa, pa, 0, ps}));
-    store(p + 2 * WIDE, 0.5 * ((Wide){pr, pd, pn, pd, ps, pb, pd, pc} + (Wide){ps, pr, ps, pn, 0, 0, pc, pf}));
+    store(p + WIDE, 0.5 * ((Wide){pb, pd, pa, pt, pr, pd, ps, pb} + (Wide){pb, pa, ps, pa, pa, ps, 0, 0}));
+    store(p + 2 * WIDE, 0.5 * ((Wide){pr, pd, pn, pd, pd, pc, 0, 0} + (Wide){ps, pr, ps, pn, pc, pf, 0, 0}));
     LANES(v[PRESSURES]); LANES(v1[PRESSURES]); LANES(v2[PRESSURES]);
     oil(VOLUMES, J ? 2 : 1, p, v, v1, v2);
     oil(PRESSURES - VOLUMES, J ? 1 : 0, p + VOLUMES, v + VOLUMES, v1 + VOLUMES, v2);
@@ -382,27 +394,28 @@ INLINE double equations(const Pump *u, const Clock *c, int k, const double *rest
         SQR(ORIFICE_2), SQR(ORIFICE_2), SQR(ORIFICE_2), SQR(ORIFICE_2), SQR(INLET_K), u->throttle_k2, SQR(hole_k), 0,
     };
     static const int mean[ORIFICES] = {M_DA, M_AS, M_TA, M_RA, M_S0, M_B0, M_DS, M_DS};
-    const double two = 2 / LIQUID_DENSITY;
+    const double two = 2 / LIQUID_DENSITY, mass = 2 / RHO_0;
     const Wide fall = {pd - pa, pa - ps, pt - pa, pr - pa, -ps, pb, pd - ps, 0};
     const Wide vm = {v[M_DA], v[M_AS], v[M_TA], v[M_RA], v[M_S0], v[M_B0], v[M_DS], 0}, ou = two * fall * vm;
-    LANES(q[ORIFICES]); LANES(du[ORIFICES]); LANES(shape[ORIFICES]);
-    orifices(oc, ok, ou, q, du, shape);
-#define TO_A(i) (du[i] * two * (v[mean[i]] + fall[i] * v1[mean[i]] / 2))
-#define TO_B(i) (du[i] * two * (fall[i] * v1[mean[i]] / 2 - v[mean[i]]))
+    const Wide ow = mass * fall;
+    LANES(q[ORIFICES]); LANES(dw[ORIFICES]); LANES(dv[ORIFICES]); LANES(shape[ORIFICES]);
+    orifices(oc, ok, ou, ow, q, dw, dv, shape);
+#define TO_A(i) (dv[i] * v1[mean[i]] / (2 * v[mean[i]]) + dw[i] * mass)
+#define TO_B(i) (dv[i] * v1[mean[i]] / (2 * v[mean[i]]) - dw[i] * mass)
 
     /* gaps */
     double slope, lift = deflection(u, pd, &slope), bend = MAX(lift, 0);
     const double h_r = COVER_CLEARANCE + bend, h_f = COVER_CLEARANCE + COVER_FACES * bend;
-    const double k_1 = K_1R * h_r * h_r * h_r + K_1F * h_f * h_f * h_f, q_1 = k_1 * v[M_D0] * pd;
-    const Flow g2 = slot(K_2, v[M_DA], v1[M_DA], pd - pa), g2s = slot(K_2S, v[M_AS], v1[M_AS], pa - ps);
-    const Flow g7 = slot(K_7, v[M_A0], v1[M_A0], pa), g9 = slot(K_9, v[M_DS], v1[M_DS], pd - ps);
+    const double k_1 = K_1R * h_r * h_r * h_r + K_1F * h_f * h_f * h_f, q_1 = k_1 * pd;
+    const Flow g2 = slot(K_2, pd - pa), g2s = slot(K_2S, pa - ps), g7 = slot(K_7, pa), g9 = slot(K_9, pd - ps);
 
     /* chains: tip gaps towards suction (0) and delivery (1); without a volume one gap between delivery and suction */
     const double drag_r = DRAG_R * u->omega, drag_n = DRAG_N * u->omega;
-    const Flow r0 = u->driver ? slot(K_R, v[M_RS], v1[M_RS], pr - ps) : slot(K_R, v[M_DS], v1[M_DS], pd - ps);
-    const Flow r1 = u->driver ? slot(K_R, v[M_DR], v1[M_DR], pd - pr) : r0;
-    const Flow n0 = u->driven ? slot(K_N, v[M_NS], v1[M_NS], pn - ps) : slot(K_N, v[M_DS], v1[M_DS], pd - ps);
-    const Flow n1 = u->driven ? slot(K_N, v[M_DN], v1[M_DN], pd - pn) : n0;
+#define TIP(K, drag, mean, drop) tip(K, drag, v[mean], v1[mean], drop)
+    const Flow r0 = u->driver ? TIP(K_R, drag_r, M_RS, pr - ps) : TIP(K_R, drag_r, M_DS, pd - ps);
+    const Flow r1 = u->driver ? TIP(K_R, drag_r, M_DR, pd - pr) : r0;
+    const Flow n0 = u->driven ? TIP(K_N, drag_n, M_NS, pn - ps) : TIP(K_N, drag_n, M_DS, pd - ps);
+    const Flow n1 = u->driven ? TIP(K_N, drag_n, M_DN, pd - pn) : n0;
 
     /* spool */
     const double swell = SWELL, over_swell = SPOOL / SWELL;
@@ -412,7 +425,7 @@ INLINE double equations(const Pump *u, const Clock *c, int k, const double *rest
     if (open) {
         const double r2 = drop * drop + SQR(DROP_ROUNDING);
         over_r2 = 1 / r2;
-        jet_s = JET_COEFFICIENT * cos(JET_ANGLE) * sqrt(2 * LIQUID_DENSITY / (v[M_DS] * sqrt(r2)));
+        jet_s = JET_COEFFICIENT * cos(JET_ANGLE) * RHO_0 * sqrt(two * v[M_DS] / sqrt(r2));
         jet = jet_s * q_h * drop;
         chamber = ahead * (CHAMBER_LINEAR + CHAMBER_QUADRATIC * ahead);
     }
@@ -434,8 +447,8 @@ INLINE double equations(const Pump *u, const Clock *c, int k, const double *rest
     /* rates */
     LANES(beta[PAD]); LANES(stiff[PAD]);
     for (int i = 0; i < PAD; i++) beta[i] = -v[i] / v1[i], stiff[i] = swell * v[i] * beta[i];
-    const double in_d = -(r1.q - drag_r) - (n1.q - drag_n) - q_1 - q[O_2] - g2.q - g9.q - nose - q_h - x[Q1];
-    const double in_s = (r0.q - drag_r) + (n0.q - drag_n) + q[O_2S] + g2s.q + g9.q + back + q_h + q[O_INLET];
+    const double in_d = -r1.q - n1.q - q_1 - q[O_2] - g2.q - g9.q - nose - q_h - x[Q1];
+    const double in_s = r0.q + n0.q + q[O_2S] + g2s.q + g9.q + back + q_h + q[O_INLET];
     const double in_a = q[O_2] + g2.q - q[O_2S] - g2s.q + q[O_3] + q[O_5] - g7.q;
     const double out_b = b.q + q[O_THROTTLE];
     const double over_d = 1 / ((c->Vd[k] + WALL_AREA * lift) / beta[L_D] + WALL_AREA * slope);
@@ -470,12 +483,12 @@ INLINE double equations(const Pump *u, const Clock *c, int k, const double *rest
     if (open) {
         const double T = shape[O_HOLES], r2 = ok[O_HOLES] * fabs(ou[O_HOLES]);
         h_x = area_1 * hole_k * T + area * ORIFICE_K(d_h_1, HOLE_LAMBDA) * (1 - r2 * T * T);
-        h_x *= HOLE_NUMBER * HOLE_CD * ou[O_HOLES];
+        h_x *= HOLE_NUMBER * HOLE_CD * ow[O_HOLES];
     }
     const double h_d = TO_A(O_HOLES), h_s = TO_B(O_HOLES);
     const double e_d = swell * v[L_D] * over_d, n_d = v1[L_D] / v[L_D];
     const double k_1d = lift > 0 ? 3 * slope * (K_1R * h_r * h_r + K_1F * COVER_FACES * h_f * h_f) : 0;
-    const double d_1 = k_1d * v[M_D0] * pd + k_1 * (v[M_D0] + v1[M_D0] / 2 * pd);
+    const double d_1 = k_1d * pd + k_1;
     J->dd = e_d * (n_d * in_d - r1.a - n1.a - d_1 - TO_A(O_2) - g2.a - g9.a + nose * n_d - h_d)
             - dx[PD] * over_d * (WALL_AREA * slope - (c->Vd[k] + WALL_AREA * lift) * lb[L_D]) / beta[L_D];
     J->ds = -e_d * (to_ps_chain + g9.b + h_s);
@@ -523,8 +536,8 @@ INLINE double equations(const Pump *u, const Clock *c, int k, const double *rest
     if (free) {
         const double p_c = SPOOL * (CHAMBER_LINEAR + 2 * CHAMBER_QUADRATIC * ahead) * (q_h > 0) + jet_s * drop;
         const double bow = q_h * jet_s * (1 - drop * drop * over_r2 / 2), thin = jet * v1[M_DS] / v[M_DS] / 4;
-        J->vd = (SPOOL - p_c * h_d - bow + thin) / SPOOL_MASS;
-        J->vs = (-p_c * h_s + bow + thin) / SPOOL_MASS;
+        J->vd = (SPOOL - p_c * h_d - bow - thin) / SPOOL_MASS;
+        J->vs = (-p_c * h_s + bow - thin) / SPOOL_MASS;
         J->vx = (-p_c * h_x - SPRING_RATE) / SPOOL_MASS;
         J->vv = -DAMPING / SPOOL_MASS;
     }
@@ -644,7 +657,7 @@ static __attribute__((noinline)) void tick(Pump *u, int k)
     oil(SLOTS, 1, pe, ve, v1e, 0);
     const double q_a = line_end(&u->clock, k, ENTRY_LOSS, pe[0], ve[0], v1e[0], 0, 0).q;
     const double q_b = line_end(&u->clock, u->clock.stride + k, 0, pe[1], ve[1], v1e[1], 0, 0).q;
-    const double end_p[2] = {pe[0] - ENTRY_LOSS * q_a * fabs(q_a), pe[1]}, end_q[2] = {q_a, q_b};
+    const double end_p[2] = {pe[0] - ENTRY_LOSS * ve[0] * q_a * fabs(q_a), pe[1]}, end_q[2] = {q_a, q_b};
     const double taken[2] = {u->x[IA] - u->had_a, u->x[IB] - u->had_b}, old_q[2] = {q[0], -q[NODES - 1]};
     Clock c;
     waves(u, FEW, half, &c);

@@ -7,12 +7,13 @@ so that differences see no noise of an integration: they are exact to rounding f
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
+from crescentlab.arguments import Settings
 from crescentlab.component import field_quantity
 from crescentlab.elaborate import Design
 from crescentlab.errors import InputError
@@ -74,7 +75,7 @@ class Reaching:
     """How the numbers of a system depend on a parameter, by elaborating the circuit anew with other values of it."""
 
     def __init__(
-        self, elaborate: Callable[[dict[str, str]], Design], system: System, design: Design, settings: Mapping[str, str]
+        self, elaborate: Callable[[Settings], Design], system: System, design: Design, settings: Settings
     ) -> None:
         """``elaborate`` makes the design of other settings; ``design`` is that of these, ``system`` its equations."""
         self.elaborate, self.system, self.design, self.settings = elaborate, system, design, dict(settings)
@@ -90,7 +91,7 @@ class Reaching:
             self.made[key] = self.with_settings({parameter.name: parameter.text(value)})
         return self.made[key]
 
-    def with_settings(self, more: Mapping[str, str]) -> Design:
+    def with_settings(self, more: Settings) -> Design:
         """The design with some settings more, or others."""
         return self.elaborate({**self.settings, **more})
 

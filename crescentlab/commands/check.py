@@ -14,6 +14,8 @@ from crescentlab.circuit import load
 from crescentlab.commands import arguments as shared
 from crescentlab.commands.text import counted, settings, table, wrapped
 from crescentlab.graph import Member, Net
+from crescentlab.units import gauge_of
+from crescentlab.yaml_text import Node
 
 MAX_NETS = 60
 """With more lines than this, nets of one kind are counted instead of listed."""
@@ -60,9 +62,18 @@ def facts(plan: Plan) -> dict[str, Any]:
             f"{name}: {said}"
             for name, component in plan.components.items()
             for said in component.remarks(netlist.sections.simulation.stop)
-        ],
+        ] + [f"{said}: pressures are gauge, above 1.01325 bar absolute" for said in _absolute(netlist.node)],
+        "warnings": list(plan.design.warnings),
         "forms": {name: type(c).type_name() for name, c in plan.components.items() if name in flexible},
     }  # fmt: skip
+
+
+def _absolute(node: Node) -> list[str]:
+    """Absolute pressures that the file gives, and what they are as gauge ones; each once."""
+    if isinstance(node.value, str):
+        return gauge_of(node.value)
+    inner = node.value if isinstance(node.value, list) else node.value.values()
+    return list(dict.fromkeys(said for each in inner for said in _absolute(each)))
 
 
 def _fluids(plan: Plan) -> dict[str, str]:
@@ -121,7 +132,8 @@ def told(plan: Plan, found: dict[str, Any]) -> str:
     lines += [f"  form        {name} is {form}: {_ends(plan, name)}" for name, form in found["forms"].items()]
     lines += [wrapped("  remark      ", said) for said in found["remarks"]]
     rows = list(_rows(plan, found["nets"]))
-    return "\n".join([*lines, "", table([("net", "domain", "given by", "taken by"), *rows], indent="  ", fold=True)])
+    parts = ["\n".join(lines), table([("net", "domain", "given by", "taken by"), *rows], indent="  ", fold=True)]
+    return "\n\n".join([*parts, *(f"  warning: {said}" for said in found["warnings"])])
 
 
 def _components(types: dict[str, str]) -> str:

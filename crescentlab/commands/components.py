@@ -13,7 +13,7 @@ from typing import Any
 from pydantic.fields import FieldInfo
 
 from crescentlab.commands.text import table
-from crescentlab.component import Component, field_quantity
+from crescentlab.component import Component, field_quantity, snake_case
 from crescentlab.domain import SIGNAL, Held, Observable, Port, Size, State
 from crescentlab.errors import InputError, nearest
 from crescentlab.fluid import Fluid
@@ -97,7 +97,15 @@ def _declared(cls: type[Component], kind: type[State] | type[Held] | type[Observ
 
 def port_row(port: Port) -> tuple[str, str, str, str, str]:
     carried = f"signal, {_quantity(port.quantity or 'ratio')}" if port.domain is SIGNAL else port.domain.name
+    carried += f", {limits}" if (limits := signal_range(port)) else ""
     return port.name, port.role, carried, _size(port.size), port.description
+
+
+def signal_range(port: Port) -> str:
+    """``0 to 1``, ``from 0 on``: what the signal is held within; empty where it has no range."""
+    if port.low is None:
+        return "" if port.high is None else f"up to {port.high:g}"
+    return f"from {port.low:g} on" if port.high is None else f"{port.low:g} to {port.high:g}"
 
 
 def _quantity(quantity: Quantity | str) -> str:
@@ -152,7 +160,11 @@ def _words(annotation: Any) -> list[str]:
     if origin in (list, tuple):
         return [f"list of {' or '.join(_words(arguments[0]))}"]
     name = getattr(annotation, "__name__", str(annotation))
-    return [{"int": "whole number", "float": "number", "str": "word", "bool": "true or false"}.get(name, name.lower())]
+    return [
+        {"int": "whole number", "float": "number", "str": "word", "bool": "true or false"}.get(
+            name, snake_case(name).replace("_", " ")
+        )
+    ]
 
 
 def default(field: FieldInfo) -> str:

@@ -20,7 +20,7 @@ from crescentlab.cli import DONE
 from crescentlab.commands import arguments as shared
 from crescentlab.commands.text import counted, settings, table
 from crescentlab.elaborate import Design
-from crescentlab.errors import InputError, UnitError
+from crescentlab.errors import InputError, MovingError, UnitError
 from crescentlab.solvers.snapshot import Snapshot
 from crescentlab.units import QUANTITIES
 
@@ -103,7 +103,7 @@ def operating_point(circuit: Circuit, values: dict[str, str], options: argparse.
         return simulated_to(circuit, values, options.at, options.start)
     if options.start is not None:
         return snapshot_of(options.start, circuit.system(values)), f"the end of {options.start}"
-    from crescentlab.analysis.steady import MovingError, steady
+    from crescentlab.analysis.steady import steady
 
     try:
         found = steady(circuit, values)

@@ -28,11 +28,11 @@ from crescentlab.units import Area, Flow, Pressure, Ratio
 class {name}(Component):
     r"""{title}: as it stands, a sharp-edged orifice between two nets.
 
-    .. math:: q = C_d A \\sqrt{{2 |\\Delta p|/\\rho}} \\, \\mathrm{{sign}} \\, \\Delta p
+    .. math:: \\rho_0 q = C_d A \\sqrt{{2 \\rho |\\Delta p|}} \\, \\mathrm{{sign}} \\, \\Delta p
 
-    \\Delta p = p_a - p_b [Pa]; q [m^3/s] from a to b; C_d = `cd` [-]; A = `area` [m^2]; \\rho [kg/m^3] at the mean
-    pressure. The root is rounded within `drop_rounding` [Pa] of zero drop, where its slope would be infinite. Not for
-    laminar flow. Source: Bernoulli's law.
+    \\Delta p = p_a - p_b [Pa]; q [m^3/s] from a to b, mass flow over \\rho_0, the density at 0 bar gauge; C_d = `cd`
+    [-]; A = `area` [m^2]; \\rho [kg/m^3] at the mean pressure. The root is rounded within `drop_rounding` [Pa] of zero
+    drop, where its slope would be infinite. Not for laminar flow. Source: Bernoulli's law.
     """
 
     area: Area = Field(gt=0, description="flow area")
@@ -46,8 +46,8 @@ class {name}(Component):
 
     def equations(self, p_a: Expr, p_b: Expr, fluid: Fluid) -> Equations:
         drop, density = p_a - p_b, fluid.density((p_a + p_b) / 2)
-        velocity = drop * sqrt(2 / density / hypot(drop, self.drop_rounding))
-        q = self.cd * self.area * velocity
+        mass_flow = self.cd * self.area * drop * sqrt(2 * density / hypot(drop, self.drop_rounding))
+        q = mass_flow / fluid.rho_0
         return {{"q_a": q, "q_b": -q, "q": q}}
 '''
 

@@ -16,7 +16,8 @@ from crescentlab.cli import DONE, FAILED
 from crescentlab.commands import arguments as shared
 from crescentlab.commands.simulate import figures, finite, progress_bar
 from crescentlab.commands.text import counted, settings, table
-from crescentlab.result import check_record, result_target
+from crescentlab.result import check_record
+from crescentlab.series_files import result_target
 from crescentlab.units import QUANTITIES
 
 

@@ -13,7 +13,7 @@ from crescentlab.cli import DONE, FAILED
 from crescentlab.commands import arguments as shared
 from crescentlab.commands.text import table
 from crescentlab.errors import InputError
-from crescentlab.result import result_target
+from crescentlab.series_files import result_target
 from crescentlab.studies import conduct, tables
 from crescentlab.studies.planning import Planned, plan_study
 from crescentlab.studies.points import DONE as GOOD

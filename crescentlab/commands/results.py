@@ -10,7 +10,8 @@ from pathlib import Path
 import numpy as np
 
 from crescentlab.commands.text import counted, table
-from crescentlab.result import matching, read_series
+from crescentlab.result import matching
+from crescentlab.series_files import read_series
 
 
 def arguments(parser: argparse.ArgumentParser) -> None:

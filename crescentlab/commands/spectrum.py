@@ -30,7 +30,8 @@ from crescentlab.commands.spectrum_text import (
 from crescentlab.commands.text import settings
 from crescentlab.errors import InputError, SimulationError, UnitError, nearest
 from crescentlab.files import check_writable, write_rows, write_text
-from crescentlab.result import SUFFIXES, Result, column_names, matching, read_series
+from crescentlab.result import Result, column_names, matching
+from crescentlab.series_files import SUFFIXES, read_series
 from crescentlab.units import DISPLAY, QUANTITIES, Quantity, is_number
 
 time, frequency, speed = QUANTITIES["time"], QUANTITIES["frequency"], QUANTITIES["speed"]

@@ -15,7 +15,7 @@ from crescentlab.commands import arguments as shared
 from crescentlab.commands.simulate import MAX_NETS, finite, progress_bar
 from crescentlab.commands.text import counted, settings, table
 from crescentlab.errors import SimulationError
-from crescentlab.result import result_target
+from crescentlab.series_files import result_target
 from crescentlab.units import QUANTITIES
 
 KEYS = (

@@ -7,7 +7,7 @@
     def test_contract():
         check_component(MyOrifice(area=5e-6), SimpleOil(...))
 
-A check raises :class:`AssertionError` that says which class breaks what. Where numbers are needed they are random
+A check raises :class:`ContractError` that says which class breaks what. Where numbers are needed they are random
 admissible ones, of the size that their quantities usually have, and the same in every run.
 """
 
@@ -29,6 +29,7 @@ from crescentlab.contract.checks import (
     check_restriction,
 )
 from crescentlab.energy import fluids_asked
+from crescentlab.errors import ArgumentError
 from crescentlab.fluid import Fluid
 
 __all__ = [
@@ -43,7 +44,7 @@ def check_component(
     backwards: Backwards = "equal",
     within: Mapping[str, tuple[float, float]] | None = None,
 ) -> None:
-    """Run every check of this module; raises :class:`AssertionError` naming the class and what it breaks.
+    """Run every check of this module; raises :class:`ContractError` naming the class and what it breaks.
 
     ``component`` is an instance with sensible numbers, or a class, whose required parameters then get the usual size
     of their quantity. Equations that ask for a fluid are checked with each of ``fluids``. ``backwards`` says what a
@@ -54,7 +55,9 @@ def check_component(
     for one in [sample(form) for form in cls.forms()] if isinstance(component, type) else [component]:
         check_documented(type(one))
         if fluids_asked(type(one)) and not fluids:
-            raise TypeError(f"{cls.__name__} asks for a fluid; write check_component({cls.__name__}, SimpleOil(...))")
+            raise ArgumentError(
+                f"{cls.__name__} asks for a fluid; write check_component({cls.__name__}, SimpleOil(...))"
+            )
         for fluid in fluids or (None,):
             case = Case(one, fluid, within or {})
             check_floats_equal_symbols(case)

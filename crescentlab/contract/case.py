@@ -14,6 +14,7 @@ from crescentlab import units
 from crescentlab.component import Component, field_quantity
 from crescentlab.domain import HYDRAULIC, ROTATIONAL, TRANSLATIONAL, Held, Observable, State
 from crescentlab.energy import fluids_needed, keeps_books, power_ports
+from crescentlab.errors import ArgumentError
 from crescentlab.fluid import Fluid
 from crescentlab.trace import Layout, Trace, numeric_fields, trace
 
@@ -48,7 +49,7 @@ class Case:
         known = [name for layout in (self.made.states, self.made.held, self.made.inputs) for name, _ in layout.slots]
         unknown = set(self.within) - set(known)
         if unknown:
-            raise TypeError(f"{self.name}: within names {min(unknown)}; its equations know {', '.join(known)}")
+            raise ArgumentError(f"{self.name}: within names {min(unknown)}; its equations know {', '.join(known)}")
 
     @property
     def cls(self) -> type[Component]:

@@ -13,8 +13,9 @@ from pydantic import ValidationError
 from crescentlab import units
 from crescentlab.component import Component
 from crescentlab.contract.case import USUAL_PRESSURE, Case, Values
-from crescentlab.domain import HYDRAULIC, SIGNAL, Held, Observable, Port, State
+from crescentlab.domain import HYDRAULIC, SIGNAL, TRANSLATIONAL, Held, Observable, Port, State
 from crescentlab.energy import power_ports
+from crescentlab.errors import ArgumentError, ContractError
 from crescentlab.fluid import Fluid
 from crescentlab.trace import Layout
 
@@ -27,11 +28,11 @@ BY_DIFFERENCE = 1e-3
 
 def _require(kept: bool, message: str) -> None:
     if not kept:
-        raise AssertionError(message)
+        raise ContractError(message)
 
 
 def check_fluid(fluid: Fluid) -> None:
-    """The laws of a fluid belong together: beta = rho dp/drho, and dw/dp = 1/rho; raises :class:`AssertionError`.
+    """The laws of a fluid belong together: beta = rho dp/drho, and dw/dp = 1/rho; raises :class:`ContractError`.
 
     At gauge pressures from 0.9 bar of tension to 1000 bar, each within what a central difference can tell.
     """
@@ -115,7 +116,7 @@ def check_jacobian(case: Case) -> None:
             told = ", ".join(f"{name} = {np.squeeze(value)}" for name, value in values.items())
             where = "" if one is case else f" for {one.component!r}"
             said = f"{case.name}: d {rows[i]} / d {columns[j]} is {found[i, j]} at {told}{where}"
-            raise AssertionError(f"{said}; round it there, inside the branch if it is in one: both are differentiated")
+            raise ContractError(f"{said}; round it there, inside the branch if it is in one: both are differentiated")
 
 
 def _at_bounds(case: Case) -> Iterator[Case]:
@@ -184,15 +185,15 @@ ROUNDING = 1e-7
 def check_energy(case: Case) -> None:
     """What enters is stored, supplied from outside or lost: dE/dt = sum P + P_s - P_d; and losses are not negative.
 
-    Where volume is converted to mass (a piston, a displacement machine) at one density, without a store for what the
-    fluid is compressed by, as much as p/beta of the power may seem to come from nowhere. Losses of parts that store a
+    Where a piston's volume is converted to mass at one density, without a store for what the fluid is compressed by, as
+    much as p/beta of the power may seem to come from nowhere. Losses of parts that store a
     fluid's energy may have either sign: a line books there what its momentum leaves out, v/a of the motion's power.
     """
     made, symbols = case.made, case.symbols()
     energy, loss, supply, entering, size = ca.vertsplit(made.books(*symbols))
     function = ca.Function("e", symbols, [ca.vertcat(_rate(case, symbols, energy), loss, supply, entering, size)])
     domains = {p.domain for p in power_ports(case.cls)}
-    converts, in_fluid = len(domains) > 1, HYDRAULIC in domains and bool(case.stored)
+    converts, in_fluid = TRANSLATIONAL in domains, HYDRAULIC in domains and bool(case.stored)
     zero: Any = 0.0
     compressed = USUAL_PRESSURE / case.fluid.bulk_modulus(zero) if converts and case.fluid is not None else 0.0
     for values in _switched(case):
@@ -217,7 +218,7 @@ def check_reaction(case: Case) -> None:
 def check_restriction(case: Case, backwards: Backwards = "equal") -> None:
     """A restriction keeps nothing: q_a + q_b = 0; with its pressures exchanged it passes what ``backwards`` says."""
     if backwards not in get_args(Backwards):
-        raise TypeError(f"backwards={backwards!r}: write one of {', '.join(map(repr, get_args(Backwards)))}")
+        raise ArgumentError(f"backwards={backwards!r}: write one of {', '.join(map(repr, get_args(Backwards)))}")
     a, b = (p for p in case.cls.ports() if p.domain is HYDRAULIC)
     for seed in range(3):
         values = case.point(seed)

@@ -8,6 +8,7 @@ from __future__ import annotations
 import ctypes
 import time
 from collections.abc import Callable
+from typing import NoReturn
 
 import numpy as np
 
@@ -19,6 +20,7 @@ from crescentlab.solvers.diagnosis import Diagnosis
 from crescentlab.solvers.elimination import elimination
 from crescentlab.solvers.functions import Functions
 from crescentlab.solvers.hybrid import ZENO_SPAN, Hybrid
+from crescentlab.solvers.jumps import ROWS, Chatter
 from crescentlab.solvers.limits import PressureLimits
 from crescentlab.solvers.options import ANGLE_STEP, RESTART_SHARE, Options
 from crescentlab.solvers.pace import CLOCK_SWING, clock_pace
@@ -26,6 +28,7 @@ from crescentlab.solvers.promotion import Promotion
 from crescentlab.solvers.records import Records, on_grid
 from crescentlab.solvers.roots import waves
 from crescentlab.solvers.snapshot import Snapshot
+from crescentlab.solvers.storms import STORM_COUNT, STORM_STEPS, Storms
 from crescentlab.solvers.trajectory import Statistics, Trajectory
 from crescentlab.system import System, Values
 
@@ -92,9 +95,12 @@ class _CompiledRun:
         self.warnings += [notice] if (notice := self.promotion.before()) else []
         self.hybrid = Hybrid(system, values, options.start, options.stop)
         self.atol = options.rtol * system.nominal
-        self.diagnosis = Diagnosis(Functions(system, values), options.rtol, self.atol)
-        self.limits = PressureLimits(system)
-        self.tension: str | None = None
+        self.limits = PressureLimits(system, values.p)
+        self.diagnosis = Diagnosis(Functions(system, values), self.limits, options.rtol, self.atol, options.solver)
+        self.storms = Storms(system)
+        self.chatter = Chatter(system, values.p)
+        self.chatter_at = FIRST_BLOCK
+        self.chattering: str | None = None
         self.run_ = native.Run()
         self.set_sizes()
         self.set_functions()
@@ -154,6 +160,8 @@ class _CompiledRun:
         r.curved = hybrid.curved.size
         r.curved_held = int(bool(r.curved) and bool(system.bits.held_dependent[hybrid.curved].any()))
         r.curved_next = self.options.start
+        r.give(storm_last=self.storms.last, storm_row=self.storms.row)
+        r.storm_steps, r.storm_count = STORM_STEPS, STORM_COUNT
         r.zeno_span = ZENO_SPAN * self.options.span
         r.last_event = -1
 
@@ -205,7 +213,7 @@ class _CompiledRun:
         if pace is not None:
             r.n_pace = pace[0].size
             r.give(pace_t=_real(pace[0]), pace_s=_real(pace[1]))
-        floor, held_floor = self.limits.ending  # what lies below is warned of
+        floor, held_floor = self.limits.states.ending, self.limits.held.ending
         r.give(atol=_real(self.atol), floor=_real(floor), held_floor=_real(held_floor))
 
     def set_scratch(self) -> None:
@@ -275,17 +283,17 @@ class _CompiledRun:
             block = max(1, min(2 * block, MOST_BLOCK, round(block * LOOK / pause)))
             self.hybrid.h, self.hybrid.b = r.kept["h"][: r.n_held].copy(), r.kept["b"][: r.n_bits].copy()
             self.drain()
+            self.warnings += self.storms.look(r.t)
             if code in ("DONE", "STOPPED"):
                 return code.lower()
             if code == "NEEDS_ROOT":
                 self.find_root()
             elif code != "PAUSED":
                 self.fail(code)
+            elif self.chattering:
+                raise SimulationError(self.chattering)
             elif self.records.size > MOST_BYTES:
-                raise SimulationError(
-                    f"its {r.steps} steps fill {self.records.size / 1e9:.1f} GB; "
-                    "an implicit solver takes fewer (--solver rodas), or simulate a shorter time"
-                )
+                self.fail_full()
             self.report()
 
     def find_root(self) -> None:
@@ -313,17 +321,13 @@ class _CompiledRun:
         return self.run_.kept["x"][: self.run_.n].copy()
 
     def drain(self) -> None:
-        """Take what was recorded, and look whether fluids that may were under tension."""
+        """Take what was recorded, and look whether a choice chatters."""
         block = self.records.drain()
-        if block is None or self.tension:
+        if block is None:
             return
-        held = block["world_h"][block["row_world"]]
-        for rows, kind in ((block["row_x"], self.limits.states), (held, self.limits.held)):
-            below = np.flatnonzero((rows < kind[1]).any(axis=1)) if any(kind[3]) else np.zeros(0, int)
-            if below.size and not self.tension:
-                k = int(below[0])
-                self.tension = self.limits.look(float(block["row_t"][k]), rows[k], *kind)
-                self.warnings += [self.tension] if self.tension else []
+        if self.run_.steps >= self.chatter_at:
+            self.chatter_at *= 2
+            self.chattering = self.chattering or self.chatter.look(*self.records.last(ROWS))
 
     # -- failures --------------------------------------------------------------------------------
 
@@ -353,7 +357,18 @@ class _CompiledRun:
         if code == "IMPOSSIBLE_HELD":
             self.limits.check(t, x, hybrid.h)
         self.diagnosis.check_finite(t, x, self.diagnosis.functions.rhs(t, x))
-        raise SimulationError(f"no step is small enough; {self.diagnosis.blame(t, x)}")
+        reason = self.chatter.look(*self.records.last(ROWS), throughout=False) or self.diagnosis.blame(t, x)
+        raise SimulationError(f"no step is small enough; {reason}")
+
+    def fail_full(self) -> NoReturn:
+        """End a run whose records have grown too large."""
+        limited = self.run_.kept["limited"][: self.run_.n]
+        most = f", most of them limited by {self.system.state_names[int(np.argmax(limited))]}," if limited.any() else ""
+        advice = "take an implicit solver (--solver rodas)" if self.options.solver == "dopri" else "take a larger rtol"
+        raise SimulationError(
+            f"its {self.run_.steps} steps{most} fill {self.records.size / 1e9:.1f} GB; "
+            f"{advice}, or simulate a shorter time"
+        )
 
     def last_events(self, count: int) -> list[str]:
         """Names of the last events, each once."""

@@ -255,17 +255,13 @@ class Hybrid:
         for k in fired:
             event = self.system.events[k]
             if event.kind == "fail":
-                names = event.message_names
-                values: np.ndarray | list[float] = (
-                    self.system.series(names, np.array([t]), x[None], self.h[None], self.b[None], self.p).ravel()
-                    if names
-                    else []
-                )
-                shown = {
-                    n.rpartition(".")[2]: q.show(float(v), DISPLAY.get(q.name, "" if q.si == "1" else None))
-                    for n, v in zip(names, values, strict=True)
-                    for q in [self.system.find(n).quantity]
-                }
+                world = np.array([t]), x[None], self.h[None], self.b[None], self.p
+                shown: dict[str, str | list[str]] = {}
+                for name in event.message_names:
+                    variable, values = self.system.find(name), self.system.series([name], *world).ravel()
+                    unit = DISPLAY.get(variable.quantity.name, "" if variable.quantity.si == "1" else None)
+                    each = [variable.quantity.show(float(value), unit) for value in values]
+                    shown[name.rpartition(".")[2]] = each if variable.vector else each[0]
                 raise SimulationError(event.message.format(**shown))
 
     def raise_unsettled(self, relation: str) -> NoReturn:

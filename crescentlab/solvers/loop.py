@@ -14,6 +14,7 @@ from crescentlab.prepared import Evaluator
 from crescentlab.solvers.diagnosis import Diagnosis
 from crescentlab.solvers.functions import Functions
 from crescentlab.solvers.hybrid import Hybrid
+from crescentlab.solvers.jumps import ROWS, Chatter
 from crescentlab.solvers.limits import PressureLimits
 from crescentlab.solvers.options import ANGLE_STEP, RESTART_SHARE, Options
 from crescentlab.solvers.pace import CLOCK_SWING, clock_pace
@@ -22,6 +23,7 @@ from crescentlab.solvers.roots import RootFinder
 from crescentlab.solvers.scipy import Stepper
 from crescentlab.solvers.snapshot import Snapshot
 from crescentlab.solvers.steppers import stepper
+from crescentlab.solvers.storms import Storms
 from crescentlab.solvers.trajectory import Happening, Paths, Recording, Statistics, Trajectory
 from crescentlab.system import System, Values
 
@@ -78,7 +80,8 @@ class _Run:
         self.hybrid = Hybrid(system, values, options.start, options.stop, self.promotion.take)
         self.roots = RootFinder(self.hybrid)
         self.atol = options.rtol * system.nominal
-        self.diagnosis = Diagnosis(self.functions, options.rtol, self.atol)
+        self.limits = PressureLimits(system, values.p)
+        self.diagnosis = Diagnosis(self.functions, self.limits, options.rtol, self.atol, options.solver)
         self.stepper: Stepper = stepper(options.solver, self.functions, options.rtol, self.atol)
         self.statistics = Statistics()
         self.steps = Recording()
@@ -88,15 +91,15 @@ class _Run:
         self.happenings: list[Happening] = []
         self.ticks = {event.name for event in system.events if event.kind == "every"}
         self.angles = [k for k, q in enumerate(system.state_quantities) if q is units.angle]
-        self.limits = PressureLimits(system)
+        self.storms = Storms(system)
+        self.chatter = Chatter(system, values.p)
+        self.chatter_at = FIRST_COUNT
         self.rate = np.zeros(self.functions.n)
         """dx/dt at the end of the last step."""
         self.step_cap = options.step_cap
         self.pace = clock_pace(system, values, options.start, options.stop)
         self.tiny = 0
         self.shown_at = 0.0
-        self.tension: str | None = None
-        """The first warning of a fluid under tension; every later step would only repeat it."""
         self.give_up: Callable[[], bool] | None = None
         self.count_at = FIRST_COUNT
 
@@ -202,7 +205,7 @@ class _Run:
         except SimulationError as problem:
             t, x = self.stepper.t, self.stepper.x
             self.diagnosis.check_finite(t, x, self.functions.rhs(t, x))
-            raise SimulationError(f"no step is small enough ({problem}); {self.diagnosis.blame(t, x)}") from None
+            raise SimulationError(f"no step is small enough ({problem}); {self.blame(t, x)}") from None
         self.statistics.steps += 1
 
     def inside(self, t: float, high: float, x_high: np.ndarray, goal: float) -> tuple[float, np.ndarray]:
@@ -249,7 +252,9 @@ class _Run:
         self.old_h, self.old_b = h, b
         self.record(t, x)
         x_after, names = hybrid.stop(t, x, due)
-        changed = x_after is not x or hybrid.h is not h or not np.array_equal(hybrid.b, b)
+        switched = np.flatnonzero(hybrid.b != b)
+        changed = x_after is not x or hybrid.h is not h or switched.size > 0
+        self.storms.turned(len(self.system.events) + switched, self.statistics.steps)
         self.sync()
         self.booked(t, names)
         if not changed:
@@ -276,6 +281,8 @@ class _Run:
     # -- books -----------------------------------------------------------------------------------
 
     def booked(self, t: float, names: list[str]) -> None:
+        self.storms.turned([self.storms.places[n] for n in names], self.statistics.steps)
+        self.warnings += self.storms.look(t)
         if not names:
             return
         events = [n for n in names if n not in self.ticks]
@@ -313,6 +320,7 @@ class _Run:
             self.grid.add(t, x, self.hybrid.h, self.hybrid.b)
 
     def report(self, t: float) -> None:
+        self.check_chatter()
         if self.give_up is not None and self.statistics.steps >= self.count_at:
             self.count_at *= 2
             done = (t - self.options.start) / self.options.span
@@ -344,21 +352,34 @@ class _Run:
         if high - low < SMALLEST_STEP * self.options.span:
             self.tiny += 1
             if self.tiny > COLLAPSE_COUNT:
-                raise SimulationError(f"the step size collapsed to {high - low:.2g} s; {self.diagnosis.blame(high, x)}")
+                raise SimulationError(f"the step size collapsed to {high - low:.2g} s; {self.blame(high, x)}")
         else:
             self.tiny = 0
+
+    def blame(self, t: float, x: np.ndarray) -> str:
+        """What keeps steps from being long enough."""
+        return self.chatter.look(*self.last_rows, throughout=False) or self.diagnosis.blame(t, x)
+
+    @property
+    def last_rows(self) -> list[np.ndarray]:
+        """Times, states, held values, bits of the last steps."""
+        return [np.array(rows[-ROWS:]) for rows in (self.steps.t, self.steps.x, self.steps.h, self.steps.b)]
+
+    def check_chatter(self) -> None:
+        """Look, each time the steps have doubled, whether a choice without an event chatters."""
+        if self.statistics.steps >= self.chatter_at:
+            self.chatter_at *= 2
+            if chatter := self.chatter.look(*self.last_rows):
+                raise SimulationError(chatter)
 
     def check_pressures(self, low: float, end: float, x_high: np.ndarray) -> None:
         """Refuse impossible pressures at the end of a step, or at the event that ends it sooner."""
         x = x_high if end >= self.stepper.t else np.array(self.stepper.interpolant()(end))
         try:
-            warning = self.limits.check(end, x, self.hybrid.h)
+            self.limits.check(end, x, self.hybrid.h)
         except SimulationError:
             self.keep_possible(low, end)
             raise
-        if warning and not self.tension:
-            self.tension = warning
-            self.warnings.append(warning)
 
     def keep_possible(self, low: float, high: float) -> None:
         """Record the last instant of a step at which all pressures were possible."""

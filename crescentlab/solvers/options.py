@@ -11,6 +11,8 @@ LEAST_STEPS = 50
 RESTART_SHARE = 1e-3
 """A change of f that moves no state by more than this share of its tolerance over a step needs no restart; a sampled
 part makes thousands of such changes, and their sum must stay within the tolerance."""
+TIGHT = 1e-7
+"""Smaller relative tolerances are left to methods of higher order than that of rodas."""
 
 
 @dataclass(frozen=True)

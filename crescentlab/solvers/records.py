@@ -57,6 +57,12 @@ class Records:
         block["piece_high"][-1] = block["row_t"][-1] = t
         block["row_x"][-1] = x
 
+    def last(self, count: int) -> tuple[Array, Array, Array, Array]:
+        """Times, states, held values and bits of the last rows, as many as the last block has of them."""
+        block = self.blocks[-1]
+        worlds = block["row_world"][-count:]
+        return block["row_t"][-count:], block["row_x"][-count:], block["world_h"][worlds], block["world_b"][worlds]
+
     def joined(self, name: str) -> Array:
         """One array of all blocks."""
         return np.concatenate([block[name] for block in self.blocks])

@@ -6,6 +6,9 @@ import numpy as np
 
 from crescentlab.solvers import scipy
 from crescentlab.solvers.functions import Functions
+from crescentlab.solvers.settling import LARGEST, Settling
+
+IMPLICIT = ("lsoda", "bdf", "radau", "cvode")
 
 
 def stepper(name: str, functions: Functions, rtol: float, atol: np.ndarray) -> scipy.Stepper:
@@ -16,6 +19,9 @@ def stepper(name: str, functions: Functions, rtol: float, atol: np.ndarray) -> s
     if method == "cvode":
         from crescentlab.solvers.sundials import Cvode  # who does not ask for it does not wait for it
 
-        return Cvode(functions, rtol, atol, layout)
-    kind = scipy.Lsoda if method == "lsoda" else scipy.Stepper
-    return kind(method, functions, rtol, atol, layout)
+        made: scipy.Stepper = Cvode(functions, rtol, atol, layout)
+    else:
+        kind = scipy.Lsoda if method == "lsoda" else scipy.Stepper
+        made = kind(method, functions, rtol, atol, layout)
+    settles = method in IMPLICIT and functions.n <= LARGEST
+    return Settling(made, functions, rtol, atol) if settles else made

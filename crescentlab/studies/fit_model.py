@@ -42,34 +42,36 @@ class CircuitModel:
         self.failures: dict[int, str] = {}
         """What the latest failing run of each row said, by row."""
         self.runs = 0
-        self._answers: list[list[int]] = self._values_of_points()
+        self._answers, self._places = self._values_of_points()
         self._warm = False
         run = problem.file.run
         self.reason = _not_exact(run, problem.times is not None)
         """Why derivatives are not exact; empty while they may be."""
         self._checked = False
 
-    def _values_of_points(self) -> list[list[int]]:
-        """For each point the numbers of the values that it answers."""
-        rows = {row: k for k, point in enumerate(self.problem.points) for row in point.rows}
-        found: list[list[int]] = [[] for _ in self.problem.points]
-        for value, (row, _) in enumerate(self.problem.where):
-            found[rows[int(row)]].append(value)
-        return found
+    def _values_of_points(self) -> tuple[list[Array], list[Array]]:
+        """For each point the numbers of the values that it answers, and their rows among those of the point."""
+        owner = np.zeros(self.problem.table.rows, dtype=int)
+        place = np.zeros(self.problem.table.rows, dtype=int)
+        for k, point in enumerate(self.problem.points):
+            owner[list(point.rows)], place[list(point.rows)] = k, np.arange(len(point.rows))
+        rows = self.problem.where[:, 0]
+        order = np.argsort(owner[rows], kind="stable")
+        answers = np.split(order, np.searchsorted(owner[rows][order], np.arange(1, len(self.problem.points))))
+        return answers, [place[rows[values]] for values in answers]
 
     def computed(self, thetas: Sequence[Array]) -> Array:
         """Values of each set of parameters, shape (sets, m); NaN where the simulation failed."""
         made = np.full((len(thetas), len(self.problem.where)), np.nan)
-        work = [(s, k) for s, k in product(range(len(thetas)), range(len(self._answers))) if self._answers[k]]
+        work = [(s, k) for s, k in product(range(len(thetas)), range(len(self._answers))) if self._answers[k].size]
         points = self.problem.points
         found = self.run([(points[k], thetas[s]) for s, k in work])
         for (s, k), values in zip(work, found, strict=True):
-            for value in self._answers[k]:
-                row, column = self.problem.where[value]
-                if isinstance(values, str):
-                    self.failures[int(row)] = values
-                else:
-                    made[s, value] = values[points[k].rows.index(int(row)), column]
+            rows, columns = self.problem.where[self._answers[k]].T
+            if isinstance(values, str):
+                self.failures.update(dict.fromkeys(rows.tolist(), values))
+            else:
+                made[s, self._answers[k]] = values[self._places[k], columns]
         return made
 
     def run(self, work: Sequence[tuple[Point, Array]], more: Sequence[str] = ()) -> list[Array | str]:
@@ -119,13 +121,12 @@ class CircuitModel:
             return None
         made = np.full((len(self.problem.where), theta.size), np.nan)
         for point, answers in zip(self.problem.points, self._answers, strict=True):
-            if not answers:
+            if not answers.size:
                 continue
             slopes = self.slopes(self.settings(point, theta))
             if slopes is None:
                 return None
-            for value in answers:
-                made[value] = slopes[self.problem.where[value, 1]]
+            made[answers] = slopes[self.problem.where[answers, 1]]
         return made
 
     def slopes(self, settings: dict[str, str]) -> Array | None:

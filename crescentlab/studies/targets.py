@@ -33,7 +33,7 @@ def _settings(design: Design, name: str) -> dict[str, Quantity | None]:
             found[f"{owner}.{info.alias or field}"] = quantity
     for full, instance in design.instances.items():
         part = instance.component
-        for declared in [s for form in type(part).forms() for kind in (State, Held) for s in form.declared(kind)]:
+        for declared in [s for form in instance.forms for kind in (State, Held) for s in form.declared(kind)]:
             found[f"{full}.start.{declared.name}"] = part.quantity(declared.quantity)
     return found
 

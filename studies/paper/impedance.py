@@ -62,7 +62,7 @@ def compute(effort: Effort) -> Data:
 def valve_by_hand(point: OperatingPoint, omega: np.ndarray) -> np.ndarray:
     r"""Impedance of the valve and its 70 cm^3 [Pa s/m^3] from the small motions of the spool.
 
-    With q = n C_d A(x) \sqrt{2p/\rho}, F = k \rho q v \cos\theta and p_c = a q + b q^2:
+    With q = n C_d A(x) \sqrt{2\rho p}/\rho_0, F = k \rho_0 q v \cos\theta and p_c = a q + b q^2:
     (m s^2 + B s + k_s + F A'/A) x = (A_s - F/p) p - A_s p_c' q, q = q A'/A x + q/(2p) p, and the displaced
     A_s s x and the compressed V s/\beta p add to the flow that comes in. \rho is constant, C_d at its largest.
     """

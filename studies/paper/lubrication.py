@@ -44,9 +44,9 @@ def compute(effort: Effort) -> Data:
     lands, (oil,) = design.instances["main_3.lands"].component, design.fluids.values()
     law = lands.parallel * math.pi * lands.diameter * lands.clearance**3 * (1 + 1.5 * lands.eccentricity**2)
     p = rows["groove_3"].to_numpy()
-    mu = np.array([float(oil.density(x / 2) * oil.kinematic_viscosity(x / 2)) for x in p])
+    nu = np.array([float(oil.kinematic_viscosity(x / 2)) for x in p])
     density = np.array([float(oil.density(x) / oil.density(0.0)) for x in rows["pump"]])
-    return Data(rows, law * p / (12 * mu * lands.length), density)
+    return Data(rows, law * p / (12 * nu * float(oil.rho_0) * lands.length), density)
 
 
 def verdicts(data: Data) -> list[Comparison]:

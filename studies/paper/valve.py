@@ -36,6 +36,7 @@ class Data:
     jet: np.ndarray
     chamber: np.ndarray
     density: np.ndarray
+    volume_flow: np.ndarray
     flow_number: np.ndarray
     discharge: np.ndarray
     lift_at_30: float
@@ -53,7 +54,7 @@ def compute(effort: Effort) -> Data:
     """Run the bench to its equilibrium at flows up to 49 L/min; trace the holes' C_d over the flow number."""
     flows = effort.of([0.05, 0.2, 0.5, 1, 2, 4, 7, 10, 14, 18, 23, 27, 30, 34, 38, 42, 45.5, 49], [0.5, 10, 30, 49])
     rows = np.array([_equilibrium(flow) for flow in flows])
-    flow, p, x, jet, chamber, rho = rows.T
+    flow, p, x, jet, chamber, rho, volume_flow = rows.T
     area, d_h = circle_segment(x, *_hole())
     speed = np.sqrt(2 * p / rho)
     return Data(
@@ -64,7 +65,8 @@ def compute(effort: Effort) -> Data:
         chamber,
         rho,
         flow_number=d_h * speed / _nu(),
-        discharge=flow / (4 * area * speed),
+        volume_flow=volume_flow,
+        discharge=volume_flow / (4 * area * speed),
         lift_at_30=_equilibrium(30)[2],
         lift_at_2=_equilibrium(2)[2],
         curve=_discharge_curve(),
@@ -72,13 +74,14 @@ def compute(effort: Effort) -> Data:
 
 
 def _equilibrium(flow: float) -> tuple[float, ...]:
-    """Flow, pressure, lift, flow force, chamber pressure and density (at half the drop) with ``flow`` [L/min]."""
+    """Flow, pressure, lift, flow force, chamber pressure; density and volume flow at half the drop."""
     filled = 0.1 + 0.1 / flow  # [s]: a small flow takes its time to bring 70 cm^3 to 6.5 bar
     result = bench().simulate(filled, {"supply": f"{flow} L/min"})
     names = ("valve.q", "p_line.p", "valve.x", "valve.holes.jet_force", "valve.p_chamber.value")
     values = [float(result[name][-1]) for name in names]
     (oil,) = result.design.fluids.values()
-    return (*values, float(oil.density(values[1] / 2)))
+    density = float(oil.density(values[1] / 2))
+    return (*values, density, values[0] * float(oil.rho_0) / density)
 
 
 def _hole() -> tuple[float, float]:
@@ -101,13 +104,13 @@ def _discharge_curve() -> tuple[np.ndarray, np.ndarray]:
         speed = math.sqrt(2 * p / oil.density(p / 2))
         q = holes.equations(p_a=p, p_b=0.0, x_rod=0.35 * MM, v_rod=0.0, fluid=oil)["q"]
         numbers.append(float(d_h * speed / _nu()))
-        found.append(float(q / (4 * area * speed)))
+        found.append(float(q * oil.rho_0 / oil.density(p / 2) / (4 * area * speed)))
     return np.array(numbers), np.array(found)
 
 
 def jet_force(data: Data) -> np.ndarray:
     """Eq. 31 without correction [N]: rho Q v cos(69 deg), v = sqrt(2 p/rho)."""
-    return data.density * data.flow * np.sqrt(2 * data.pressure / data.density) * math.cos(JET_ANGLE)
+    return data.density * data.volume_flow * np.sqrt(2 * data.pressure / data.density) * math.cos(JET_ANGLE)
 
 
 def verdicts(data: Data) -> list[Comparison]:

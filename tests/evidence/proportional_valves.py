@@ -122,7 +122,7 @@ def edges_in_series() -> list[Number]:
     """Flow to a at strokes of 0, 0.5, -1 and 1 from 100 to 20 bar: 10 mm^2, n = 2 (1 - x); and its metered drop."""
     valve, found = FlowDivider(area=20e-6, centring_range=1 * BAR), []
     for x, n in ((0.0, 2.0), (0.5, 1.0), (-1.0, 4.0), (1.0, 0.0)):
-        got = valve.equations(p_inlet=100 * BAR, p_a=20 * BAR, p_b=0.0, stroke=x, fluid=THIN)
+        got = valve.equations(p_inlet=100 * BAR, p_a=20 * BAR, p_b=0.0, stroke=x, at=0.0, fluid=THIN)
         share = n * n / (1 + n * n)
         found.append(Number(f"stroke {x:g}: flow", through(10e-6, share * 80 * BAR), -got["q_a"], "L/min", size=1e-3))
         found.append(Number(f"stroke {x:g}: metered drop", share * 80 * BAR, got["drop_a"], "bar", size=1e5))
@@ -174,15 +174,15 @@ def priority() -> list[Number]:
 
 @evidence(
     "priority_valve",
-    source="balance of forces: s_0 = (p_CF - p_LS - p_c)/p_r within 0 and 1",
+    source="balance of forces: s_0 = (p_CF - p_LS - p_c)/p_r, beyond 0 and 1 the force on a stop",
     tolerance=1e-9,
     because="rounding",
 )
 def spool() -> list[Number]:
-    """Where 6, 8, 9 and 20 bar between priority outlet and load put the spool, set to 7 bar and 2 bar further."""
+    """Where 6, 8, 9 and 20 bar between priority outlet and load lead the spool, set to 7 bar and 2 bar further."""
     valve = PriorityValve(area=50e-6, control_pressure=7 * BAR, control_range=2 * BAR, time_constant=1.0)
-    at = {"p_inlet": 150 * BAR, "p_surplus": 3 * BAR, "p_load": 60 * BAR, "lift": 0.0, "fluid": THIN}
+    at = {"p_inlet": 150 * BAR, "p_surplus": 3 * BAR, "p_load": 60 * BAR, "lift": 0.0, "at": 0.0, "fluid": THIN}
     return [
         Number(f"{drop} bar", share, float(valve.equations(p_priority=(60 + drop) * BAR, **at)["der_lift"]))
-        for drop, share in ((6, 0.0), (8, 0.5), (9, 1.0), (20, 1.0))
+        for drop, share in ((6, -0.5), (8, 0.5), (9, 1.0), (20, 6.5))
     ]

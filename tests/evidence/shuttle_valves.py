@@ -66,7 +66,7 @@ def switches() -> list[Number]:
 def ideal() -> list[Number]:
     """60 L/min at 0.1 bar, none at -100 bar."""
     valve = IdealCheckValve()
-    forwards, backwards = (valve.equations(p_a=p * BAR, p_b=0.0)["q"] for p in (0.1, -100.0))
+    forwards, backwards = (valve.equations(p_a=p * BAR, p_b=0.0, fluid=STIFF)["q"] for p in (0.1, -100.0))
     return [Number("forwards", 1e-3, forwards, "L/min"), Number("backwards", 0.0, backwards, "L/min")]
 
 

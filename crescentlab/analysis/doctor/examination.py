@@ -8,17 +8,19 @@ exact laws.
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
-from crescentlab.analysis.doctor.activity import activities, indices
+from crescentlab import arguments
+from crescentlab.analysis.doctor.activity import activities, indices, passed_on
 from crescentlab.analysis.doctor.line_errors import LineError, line_errors
 from crescentlab.analysis.doctor.run_modes import RunModes, run_modes
 from crescentlab.analysis.linear.modes import Mode
-from crescentlab.circuit import Circuit
+from crescentlab.arguments import Number, Settings
+from crescentlab.circuit import Circuit, check_circuit
 from crescentlab.errors import InputError
 from crescentlab.result import Result
 from crescentlab.units import QUANTITIES
@@ -38,6 +40,8 @@ STABLE = 3.0
 """Largest |s| h of an explicit method: about where RK45 ends on the real axis."""
 STIFF = 3.0
 """A circuit is called stiff if stability would make an explicit method take this many times as many steps."""
+IMPLICIT = ("rodas", "radau", "lsoda")
+"""Implicit methods, the first to try first."""
 RINGS = 0.1
 """Damping ratio below which a mode rings on."""
 ENOUGH = 0.99
@@ -71,12 +75,25 @@ class Examination:
     """Held values of components that tick, which have no modes here."""
     activity: dict[str, float]
     """[J], largest first."""
+    passed_on: dict[str, float]
+    """[J], at the nets where a component gives the motion."""
     lines: tuple[LineError, ...]
+
+    def __repr__(self) -> str:
+        """Of which run."""
+        s, title = self.result.trajectory.statistics, self.result.title
+        return f"<Examination {title!r}: {self.span:g} s, {s.steps} steps, {len(self.lines)} lines>"
 
     @property
     def index(self) -> dict[str, float]:
         """Activity index, largest first."""
         return indices(self.activity)
+
+    def without_part(self, name: str) -> bool:
+        """Whether hardly any energy stays in a component, and hardly any passes where it gives the motion."""
+        every = sum(self.activity.values())
+        index = self.index.get(name)
+        return index is not None and index < 1 - ENOUGH and self.passed_on.get(name, 0.0) < (1 - ENOUGH) * every
 
     @property
     def span(self) -> float:
@@ -116,14 +133,16 @@ class Examination:
 
 
 def examine(
-    circuit: Circuit, parameters: Mapping[str, str] | None = None, *, stop: str | float | None = None,
-    rtol: float | None = None, period: str | float | None = None, line_error: float = LINE_ERROR,
+    circuit: Circuit, parameters: Settings | None = None, *, stop: str | float | None = None,
+    rtol: float | None = None, period: str | float | None = None, line_error: Number = LINE_ERROR,
     compile: bool | None = None, progress: Callable[[float], None] | None = None,
 ) -> Examination:  # fmt: skip
     """Run a circuit once and examine it; ``line_error`` is the largest error of a line that is let pass.
 
     Raises :class:`InputError` for wrong input, :class:`SimulationError` if the run fails.
     """
+    check_circuit(circuit, "doctor")
+    bound = bound_of(line_error)
     seconds = _period(circuit, parameters, period)
     result = circuit.simulate(stop, parameters, solver="rodas", rtol=rtol, compile=compile, progress=progress)
     system, statistics = result.system, result.trajectory.statistics
@@ -136,11 +155,11 @@ def examine(
     }
     return Examination(
         result, instants, _limits(system.state_names, statistics.limited, instants[-1]), _happened(result), ticking,
-        activities(result), tuple(line_errors(result, circuit.library, seconds, line_error)),
+        activities(result), passed_on(result), tuple(line_errors(result, circuit.library, seconds, bound)),
     )  # fmt: skip
 
 
-def _period(circuit: Circuit, parameters: Mapping[str, str] | None, given: str | float | None) -> float | None:
+def _period(circuit: Circuit, parameters: Settings | None, given: str | float | None) -> float | None:
     """The circuit's period, if it has one."""
     if given is None and circuit.netlist.sections.simulation.period is None:
         return None
@@ -207,13 +226,13 @@ def _on_limits(found: Examination) -> list[str]:
         owner = limit.state.rpartition(".")[0]
         text = f"{limit.state} limited {100 * limit.share:.0f} % of the steps"
         text += f"; its part in the circuit is {mode_text(limit.mode)}" if limit.mode else "; it only adds up"
-        index = found.index.get(owner)
         if limit.share < MUCH and not (limit.mode and 0 < limit.mode.damping_ratio < RINGS):
             continue
         if limit.mode and 0 < limit.mode.damping_ratio < RINGS:
             text += ", which rings on: friction or leakage that the model leaves out would let the steps grow"
-        if index is not None and index < (1 - ENOUGH):
-            text += f"; {owner} has {100 * index:.2g} % of the activity: does the run need it in this detail?"
+        if found.without_part(owner):
+            share = 100 * found.index[owner]
+            text += f"; {owner} has {share:.2g} % of the activity: does the run need it in this detail?"
         said.append(text)
     return said
 
@@ -224,14 +243,18 @@ def _on_stiffness(found: Examination) -> list[str]:
         return []
     fastest = found.stiffest.mode(int(found.stiffest.limiting[0]))
     who = next(iter(fastest.parts))
+    used = found.result.trajectory.solver.split()[0].rstrip(":")
+    own = {used, found.result.design.netlist.sections.simulation.solver}
+    asked = f"{who} ({mode_text(fastest)})"
     if found.stiff:
+        others = " or ".join([name for name in IMPLICIT if name not in own][:2])
         return [
-            f"the circuit is stiff: {who} ({mode_text(fastest)}) would make an explicit method take about "
-            f"{found.explicit_steps:.0f} steps where rodas took {steps}; use --solver rodas or bdf"
+            f"the circuit is stiff: {asked} would make an explicit method take about {found.explicit_steps:.0f} steps "
+            f"where {used} took {steps}; implicit methods suit it, --solver {others} as well"
         ]
     return [
-        f"the circuit is not stiff: its fastest mode ({who}, {mode_text(fastest)}) asks for about "
-        f"{found.explicit_steps:.0f} steps of an explicit method, rodas took {steps}; --solver dopri may be faster"
+        f"the circuit is not stiff: its fastest mode, {asked}, asks for about {found.explicit_steps:.0f} steps of an "
+        f"explicit method, {used} took {steps}" + ("; --solver dopri may be faster" if "dopri" not in own else "")
     ]
 
 
@@ -302,12 +325,9 @@ def _mode(mode: Mode) -> dict[str, Any]:
     }  # fmt: skip
 
 
-def bound_of(text: str) -> float:
+def bound_of(text: Number) -> float:
     """The bound of ``--line-error``: a ratio between 0 and 2."""
-    try:
-        bound = QUANTITIES["ratio"].parse(text)
-    except InputError as error:
-        raise InputError(f"--line-error: {error.message}") from None
+    bound = arguments.quantity(text, "--line-error", QUANTITIES["ratio"])
     if not 0 < bound <= 2:
         raise InputError(f"--line-error {text}: an error lies between 0 and 200 %; write for example '5 %'")
     return bound

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from crescentlab import arguments
 from crescentlab.analysis.linear.inputs import net_named
 from crescentlab.analysis.linear.model import LinearModel, linear_model, operating_point
 from crescentlab.analysis.linear.modes import Mode, modes
@@ -22,7 +23,8 @@ from crescentlab.analysis.linear.two_ports import (
     exact_lines,
     only_lines_tick,
 )
-from crescentlab.circuit import Circuit, Start
+from crescentlab.arguments import Settings
+from crescentlab.circuit import Circuit, Start, check_circuit
 from crescentlab.domain import HYDRAULIC
 from crescentlab.elaborate import Design
 from crescentlab.errors import InputError, UnitError, nearest
@@ -145,7 +147,7 @@ def joined(
 
 
 def frequency_response(
-    circuit: Circuit, parameters: Mapping[str, str] | None = None, *,
+    circuit: Circuit, parameters: Settings | None = None, *,
     at: OperatingPoint | Start | None = None,
     inputs: Sequence[str] = (), outputs: Sequence[str] = (), impedances: Sequence[str] = (),
     omega: Array | tuple[float, float] = (2 * math.pi, 4000 * math.pi), points: int = POINTS, exact: bool = False,
@@ -156,7 +158,8 @@ def frequency_response(
     there, whatever drives the circuit from outside it). ``exact`` adds what the lines' own laws give. Names, and what
     is refused: :func:`crescentlab.analysis.linear.linearize`.
     """
-    settings = dict(parameters or {})
+    check_circuit(circuit, "frequency_response")
+    settings = arguments.settings(parameters)
     design = circuit.design(settings)
     wanted = [_impedance(design, name) for name in dict.fromkeys(impedances)]
     inputs, outputs = list(dict.fromkeys(inputs)), list(dict.fromkeys(outputs))

@@ -7,7 +7,7 @@ assembled: it takes what the net gives, so it changes neither the causality nor 
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -15,6 +15,7 @@ import numpy as np
 
 from crescentlab import units
 from crescentlab.analysis.reach import NotDifferentiableError, Parameter, Reaching, quantity_of
+from crescentlab.arguments import Settings
 from crescentlab.circuit import Circuit
 from crescentlab.component import Component, Equations
 from crescentlab.domain import HYDRAULIC, ROTATIONAL, TRANSLATIONAL, takes_motion, takes_pressure, takes_rotation
@@ -140,7 +141,7 @@ def size_of_net(design: Design, net: DesignNet) -> int | None:
 class Inputs:
     """Resolves the names of inputs: first probes into the design, then places in the assembled system's p."""
 
-    def __init__(self, circuit: Circuit, settings: Mapping[str, str], design: Design) -> None:
+    def __init__(self, circuit: Circuit, settings: Settings, design: Design) -> None:
         self.circuit, self.settings, self.design = circuit, dict(settings), design
         self.found: dict[str, Input] = {}
 
@@ -185,7 +186,7 @@ class Inputs:
                 replace(net, ports=[*net.ports, ref]) if net.name == target.net.name else net
                 for net in self.design.nets
             ]
-            instances = {**self.design.instances, instance: Instance(instance, part, None)}
+            instances = {**self.design.instances, instance: Instance(instance, part, None, forms=(type(part),))}
             self.design = replace(self.design, instances=instances, nets=nets)
         self.found[name] = Input(name, quantity, instance)
 
@@ -245,7 +246,7 @@ class Inputs:
             raise InputError(f"input {name}: no number inside the equations depends on it; it changes nothing here")
         return Input(name, value.quantity, "", tuple((int(k), float(slope[k])) for k in places))
 
-    def _with_probes(self, settings: dict[str, str]) -> Design:
+    def _with_probes(self, settings: Settings) -> Design:
         """The design of other settings with the same probes."""
         design = self.circuit.design(settings)
         probes = {n: i for n, i in self.design.instances.items() if isinstance(i.component, _Probe)}

@@ -13,7 +13,7 @@ left out unless something reads it.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -23,13 +23,15 @@ import numpy as np
 from scipy.sparse import csc_array, eye_array
 from scipy.sparse.linalg import splu
 
+from crescentlab import arguments
 from crescentlab.analysis.derivatives import Derivatives, Output, Point, output_named
 from crescentlab.analysis.linear.boundaries import one_sided
 from crescentlab.analysis.linear.inputs import Input, Inputs
 from crescentlab.analysis.linear.reduction import Reduction, still_states
 from crescentlab.analysis.linear.transfer_paths import check_paths
 from crescentlab.analysis.tick_map import tick_map
-from crescentlab.circuit import Circuit, Start, snapshot_of
+from crescentlab.arguments import Settings
+from crescentlab.circuit import Circuit, Start, check_circuit, snapshot_of
 from crescentlab.elaborate import Design
 from crescentlab.errors import InputError
 from crescentlab.result import Result
@@ -76,6 +78,17 @@ class LinearModel:
     """Response of z over a tick to u = (tau/T)^k/k!, shape (z, k, inputs)."""
     direct: Array | None = field(default=None, repr=False)
     """Response of z to u at the tick itself, shape (z, inputs)."""
+
+    def __repr__(self) -> str:
+        """Its shape, and what it leads from and to."""
+        inputs, outputs = (
+            ", ".join(each.name for each in several[:8]) or "none" for several in (self.inputs, self.outputs)
+        )
+        kind = "" if self.period is None else f", sampled each {self.period:g} s"
+        return (
+            f"<LinearModel of {len(self.states)} states{kind}, residual {self.residual:.1e}; "
+            f"{len(self.inputs)} inputs: {inputs}; {len(self.outputs)} outputs: {outputs}>"
+        )
 
     @property
     def nyquist(self) -> float:
@@ -137,7 +150,7 @@ def shifted_solver(A: Array) -> Callable[[complex, Array], Array]:
 
 
 def linearize(
-    circuit: Circuit, parameters: Mapping[str, str] | None = None, *,
+    circuit: Circuit, parameters: Settings | None = None, *,
     at: OperatingPoint | Start | None = None,
     inputs: Sequence[str] = (), outputs: Sequence[str] = (),
 ) -> LinearModel:  # fmt: skip
@@ -152,7 +165,7 @@ def linearize(
 
 
 def linear_model(
-    circuit: Circuit, parameters: Mapping[str, str] | None = None, *,
+    circuit: Circuit, parameters: Settings | None = None, *,
     at: OperatingPoint | Start | None = None,
     inputs: Sequence[str] = (), outputs: Sequence[str] = (), ticking: bool = True,
 ) -> LinearModel:  # fmt: skip
@@ -160,7 +173,9 @@ def linear_model(
 
     Without ``ticking`` all held values stay as they are, and ticks do not happen: the differential equations alone.
     """
-    settings = dict(parameters or {})
+    check_circuit(circuit, "linearize")
+    settings = arguments.settings(parameters)
+    inputs, outputs = arguments.names(inputs, "inputs", "supply"), arguments.names(outputs, "outputs")
     plain = circuit.design(settings)
     snapshot = operating_point(circuit, settings, at)
     work = Inputs(circuit, settings, plain)
@@ -175,7 +190,7 @@ def linear_model(
     return one.done() if ticking else one.continuous()
 
 
-def operating_point(circuit: Circuit, settings: Mapping[str, str], at: OperatingPoint | Start | None) -> Snapshot:
+def operating_point(circuit: Circuit, settings: Settings, at: OperatingPoint | Start | None) -> Snapshot:
     """The point that ``at`` names, by default the circuit's point of rest."""
     if at is None:
         from crescentlab.analysis.steady import steady
@@ -183,6 +198,8 @@ def operating_point(circuit: Circuit, settings: Mapping[str, str], at: Operating
         return steady(circuit, settings).snapshot
     if isinstance(at, (Snapshot, Result, Path, str)):
         return snapshot_of(at, circuit.system(settings))
+    if not hasattr(at, "snapshot"):
+        raise InputError(f"at: {at!r} is neither an operating point, nor a result or its file")
     return at.snapshot
 
 

@@ -11,13 +11,15 @@ period, integrated as every other.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
 
+from crescentlab import arguments
 from crescentlab.analysis.periodic.anderson import Anderson
-from crescentlab.circuit import Circuit, Start, check_options, snapshot_of
+from crescentlab.arguments import Settings
+from crescentlab.circuit import Circuit, Start, check_circuit, check_options, snapshot_of
 from crescentlab.elaborate import Design
 from crescentlab.errors import InputError, SimulationError
 from crescentlab.netlist import SMALLEST_RTOL
@@ -72,6 +74,12 @@ class Periodic:
     """Periods that a plain transient needs to come as near, if it was counted."""
     message: str = ""
 
+    def __repr__(self) -> str:
+        """How far it came, and the figures at the period's end."""
+        state = "converged" if self.converged else "not converged"
+        found = f"{state} in {self.periods} periods of {self.period:g} s, residual {self.residual:.1e}"
+        return f"<Periodic {self.result.title!r}: {found}; {self.result.summed_up()}>"
+
     @property
     def end(self) -> Snapshot:
         """Where the last period ended."""
@@ -88,7 +96,7 @@ class Periodic:
 
 
 def periodic(
-    circuit: Circuit, parameters: Mapping[str, str] | None = None, *, period: str | float | None = None,
+    circuit: Circuit, parameters: Settings | None = None, *, period: str | float | None = None,
     tolerance: float | None = None, most: int = 300, solver: str = "rodas", rtol: float | None = None,
     compile: bool | None = None, start: Start | None = None, accelerate: bool = True, compare: bool = False,
     progress: Callable[[float], None] | None = None,
@@ -99,24 +107,25 @@ def periodic(
     times the integration's. ``compare`` counts the periods of a plain transient as well. Raises :class:`InputError` if
     the period is not known or not a whole number of a sampled part's ticks, :class:`SimulationError` if a run fails.
     """
+    check_circuit(circuit, "periodic")
+    parameters = arguments.settings(parameters)
     design = circuit.design(parameters)
     seconds = circuit.period(design, period)
     section = circuit.netlist.sections.simulation
-    rtol = section.rtol if rtol is None else rtol
+    rtol = section.rtol if rtol is None else arguments.number(rtol, "rtol", "1e-6")
     system = circuit.assembled(design)
     if changed := whole_ticks(system, design, seconds):
-        design = circuit.design({**(parameters or {}), **changed})
+        design = circuit.design({**parameters, **changed})
     values = system.values(design)
     options = Options(
         stop=seconds, rtol=rtol, solver=solver, compile=section.compile if compile is None else compile,
         max_step=section.max_step,
     )  # fmt: skip
     check_options(options)
-    tolerance = 10 * rtol if tolerance is None else tolerance
+    tolerance = 10 * rtol if tolerance is None else arguments.number(tolerance, "tolerance", "1e-4")
     if not SMALLEST_RTOL <= tolerance < 1:
         raise InputError(f"tolerance {tolerance:g}: write a number from 1e-13 to below 1, for example 1e-4")
-    if most < FEWEST:
-        raise InputError(f"most {most}: write {FEWEST} periods or more, for example 300")
+    most = arguments.whole(most, "most", FEWEST, 300)
     begin = None if start is None else snapshot_of(start, system)
     search = _Search(system, values, options, seconds, tolerance, begin)
     found = search.run(most, accelerate, progress)
@@ -181,7 +190,7 @@ class _Search:
         self.nominal = np.concatenate([system.nominal[self.states], held_nominal[self.held]])
         self.scale = self.nominal.copy()
         self.anderson = Anderson(MEMORY, NOISE * options.rtol)
-        self.limits = PressureLimits(system)
+        self.limits = PressureLimits(system, values.p)
         self.periods = 0
         self.multiplier = math.nan
 

@@ -16,6 +16,7 @@ from typing import Any
 
 import numpy as np
 
+from crescentlab import arguments
 from crescentlab.analysis.outcome import Outcome, Window
 from crescentlab.analysis.reach import NotDifferentiableError, Parameter, Reach, Reaching
 from crescentlab.analysis.sensitivity.differences import LOOSEST, Runs, differences
@@ -24,7 +25,8 @@ from crescentlab.analysis.sensitivity.moved import Moving
 from crescentlab.analysis.sensitivity.parameters import find
 from crescentlab.analysis.sensitivity.tones import STAYS, check_tones, refusal, tones
 from crescentlab.analysis.sensitivity.variational import trajectory_sensitivity
-from crescentlab.circuit import Circuit, Start, snapshot_of
+from crescentlab.arguments import Number, Settings
+from crescentlab.circuit import Circuit, Start, check_circuit, snapshot_of
 from crescentlab.errors import InputError, nearest
 from crescentlab.result import Result
 from crescentlab.units import QUANTITIES, Quantity
@@ -62,6 +64,13 @@ class Sensitivities:
     reason: tuple[str, ...]
     result: Result
 
+    def __repr__(self) -> str:
+        """What was differentiated by what."""
+        outcomes = ", ".join(outcome.text for outcome in self.outcomes[:8])
+        parameters = ", ".join(parameter.name for parameter in self.parameters[:8])
+        shape = f"{len(self.outcomes)} outcomes by {len(self.parameters)} parameters"
+        return f"<Sensitivities of {shape}: {outcomes}; {parameters}>"
+
     @property
     def relative(self) -> Array:
         """Logarithmic sensitivities: percent of the outcome per percent of the parameter."""
@@ -72,9 +81,9 @@ class Sensitivities:
 
 
 def sensitivities(
-    circuit: Circuit, outcomes: Sequence[Outcome], parameters: Sequence[str],
-    settings: Mapping[str, str] | None = None, *, stop: str | float | None = None, start: Start | None = None,
-    window: tuple[float | None, float | None] = (None, None), method: str = "auto", solver: str = "rodas",
+    circuit: Circuit, outcomes: Sequence[Outcome | str], parameters: Sequence[str],
+    settings: Settings | None = None, *, stop: str | float | None = None, start: Start | None = None,
+    window: tuple[Number | None, Number | None] = (None, None), method: str = "auto", solver: str = "rodas",
     rtol: float | None = None, compile: bool | None = None, check: bool = True,
 ) -> Sensitivities:  # fmt: skip
     """Derivatives of outcomes by parameters, named as for ``--set`` and varied about ``settings``.
@@ -86,22 +95,32 @@ def sensitivities(
     :class:`InputError` for names, words, whole numbers, and an amplitude whose frequency depends on a parameter,
     :class:`SimulationError` where a run fails.
     """
+    check_circuit(circuit, "sensitivity")
+    outcomes = _outcomes(outcomes)
+    parameters = arguments.names(parameters, "parameters", "supply")
     _check(outcomes, parameters, method)
-    given = dict(settings or {})
+    given = arguments.settings(settings)
+    window = (_instant(window[0]), _instant(window[1]))
     design = circuit.design(given)
     system = circuit.system(given)
     found = tuple(find(system, design, name) for name in parameters)
     reaching = Reaching(circuit.design, system, design, given)
     quantities = tuple(outcome.quantity(system, system.values(design), design) for outcome in outcomes)
-    tight = RTOL if rtol is None else rtol
+    tight = RTOL if rtol is None else arguments.number(rtol, "rtol", "1e-8")
     options: dict[str, Any] = {"stop": stop, "solver": solver, "rtol": tight, "compile": compile, "start": start}
     runs = Runs(circuit, outcomes, given, options, window)
     work = _Work(runs, found, reaching, tight)
     result = runs.simulate()
     shown = Window(result, *window)
     check_tones(shown, outcomes, found, reaching)
-    if method == "differences":
-        reasons: list[str | None] = ["asked for"] * len(found)
+    reasons: list[str | None]
+    if start is None and circuit.netlist.sections.simulation.start is not None:
+        if method == "exact":
+            said = "--method exact: the run begins at the operating point, which moves with the parameters"
+            raise InputError(f"{said}; write --method differences")
+        reasons = ["the run begins at the operating point, which moves with it"] * len(found)
+    elif method == "differences":
+        reasons = ["asked for"] * len(found)
     else:
         reasons = work.exact(result, snapshot_of(start, result.system) if start is not None else None)
         if check and method == "auto":
@@ -115,6 +134,21 @@ def sensitivities(
         tuple(outcomes), found, quantities, values, work.derivative, work.error, tuple(work.method),
         tuple(work.reason), result,
     )  # fmt: skip
+
+
+def _outcomes(given: Any) -> list[Outcome]:
+    """Outcomes, or their texts."""
+    if isinstance(given, Outcome):
+        return [given]
+    mixed = [given] if isinstance(given, str) or not isinstance(given, Sequence) else given
+    for each in mixed:
+        if not isinstance(each, (str, Outcome)):
+            raise InputError(f"outcomes: {each!r} is no outcome; write for example 'mean(delivery.p)'")
+    return [Outcome(each, each) if isinstance(each, str) else each for each in mixed]
+
+
+def _instant(given: Number | None) -> float | None:
+    return None if given is None else arguments.quantity(given, "window", QUANTITIES["time"])
 
 
 def _check(outcomes: Sequence[Outcome], parameters: Sequence[str], method: str) -> None:

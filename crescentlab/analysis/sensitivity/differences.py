@@ -13,6 +13,7 @@ import numpy as np
 from crescentlab.analysis.outcome import Outcome, Window
 from crescentlab.analysis.reach import Parameter, Reaching
 from crescentlab.analysis.sensitivity.extremes import refined
+from crescentlab.arguments import Settings
 from crescentlab.circuit import Circuit
 from crescentlab.errors import InputError, SimulationError
 from crescentlab.result import Result
@@ -31,7 +32,7 @@ class Runs:
 
     circuit: Circuit
     outcomes: Sequence[Outcome]
-    settings: Mapping[str, str]
+    settings: Settings
     options: Mapping[str, Any]
     """Arguments of :meth:`Circuit.simulate`: stop, solver, rtol, compile, start."""
     window: tuple[float | None, float | None]

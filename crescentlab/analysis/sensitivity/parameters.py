@@ -48,8 +48,7 @@ def _checked(name: str, value: Any, quantity: Quantity | None) -> Parameter:
 
 def _start(system: System, design: Design, component: str, state: str, name: str) -> Parameter:
     instance = design.instances[component]
-    forms = type(instance.component).forms()
-    stateful = {s.name: s for form in forms for s in form.declared(State) + form.declared(Held)}
+    stateful = {s.name: s for form in instance.forms for s in form.declared(State) + form.declared(Held)}
     if state not in stateful:
         raise InputError(f"--parameter {name}: {component} has no state {state!r}: {nearest(state, stateful)}")
     values = system.values(design)

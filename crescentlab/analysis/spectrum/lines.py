@@ -18,10 +18,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from crescentlab import arguments
 from crescentlab.analysis.spectrum.dense import SWING, Dense, Nodes, harmonics
+from crescentlab.arguments import Number
 from crescentlab.errors import InputError
+from crescentlab.recorded import Recorded
 from crescentlab.result import Result
-from crescentlab.units import DISPLAY, QUANTITIES, Quantity, ratio
+from crescentlab.units import QUANTITIES, Quantity, quantity_of_si
 
 Array = np.ndarray
 
@@ -67,6 +70,14 @@ class Spectrum:
     error: float
     """Bound of what integration may have left out of a line (SI)."""
 
+    def __repr__(self) -> str:
+        """Of what, and its strongest lines."""
+        si = self.quantity.si
+        lines = ", ".join(f"{line.amplitude:.4g} at {line.frequency:.6g} Hz" for line in self.strongest(4))
+        return (
+            f"<Spectrum {self.name!r}: mean {self.mean:.5g} {si}, ripple {self.rms:.4g} rms, lines {lines or 'none'}>"
+        )
+
     @property
     def amplitude(self) -> Array:
         """Peak values A_k (SI)."""
@@ -91,14 +102,23 @@ class Spectrum:
 
 
 def spectra(
-    result: Result, names: Sequence[str], period: float, *, periods: int | None = None, start: float | None = None,
-    highest: float | None = None,
+    result: Result, names: str | Sequence[str], period: Number, *, periods: int | None = None,
+    start: Number | None = None, highest: Number | None = None,
 ) -> list[Spectrum]:  # fmt: skip
-    """Spectra of variables over whole periods [s] that end with the run.
+    """Spectra of variables over whole periods [s] that end with the run; of a result that was read, from its even rows.
 
     ``periods`` of them, or as many as fit after ``start`` [s], or the last one. Lines go up to ``highest`` [Hz], by
     default 50 harmonics. Raises :class:`InputError` if the run is too short, or for names that do not exist.
     """
+    arguments.instance(result, Result, "spectrum", "write circuit.simulate() or crescentlab.read(path) first")
+    names, period = arguments.names(names, "names"), arguments.seconds(period, "period")
+    periods = None if periods is None else arguments.whole(periods, "periods", 1, 1)
+    start = None if start is None else arguments.quantity(start, "start", time)
+    highest = None if highest is None else arguments.quantity(highest, "highest", frequency, above=0.0)
+    if isinstance(result, Recorded):
+        columns = [column for name in names for column in result.elements(name)]
+        series = Series(str(result.path), result.time, {n: result[n] for n in columns}, result.units)
+        return spectra_of_rows(series, columns, period, periods=periods, start=start, highest=highest)
     dense = Dense(result, names)
     stop, count = dense.stop, whole_periods(dense.start, dense.stop, period, periods, start)
     begin = _begin(dense, stop, count * period)
@@ -247,7 +267,7 @@ def spectra_of_rows(
         mean, rms = float(window.mean()), float(window.std())
         transform = 2 / m * np.fft.rfft(window - mean)[1 : lines + 1] * turning
         change, aliased = _change_of_rows(y, m // count, rms), _aliased(window, transform, turning)
-        quantity = quantity_of_unit(series.units.get(name, ""))
+        quantity = quantity_of_si(series.units.get(name, ""))
         window_facts = (name, quantity, begin, begin + count * period, period, count)
         found.append(Spectrum(*window_facts, frequencies, transform, mean, rms, change, aliased))
     return found
@@ -267,10 +287,3 @@ def _aliased(window: Array, lines: Array, turning: Array) -> float:
     coarse = 2 / half.size * np.fft.rfft(half - half.mean())[1:]
     some = min(lines.size, (half.size - 1) // 2)
     return float(np.abs(coarse[:some] * turning[:some] - lines[:some]).max()) if some else float("nan")
-
-
-def quantity_of_unit(si: str) -> Quantity:
-    """The quantity that a file's SI unit belongs to; one with a display unit before others."""
-    known = [q for q in QUANTITIES.values() if q.si == si]
-    shown = [q for q in known if q.name in DISPLAY]
-    return (shown or known or [ratio if si in ("", "1") else Quantity(si, si, (0, 0, 0, 0), {})])[0]

@@ -5,6 +5,5 @@ from crescentlab.analysis.steady.search import (
     OperatingPoint,
     steady,
 )
-from crescentlab.analysis.steady.unrest import MovingError
 
-__all__ = ["Method", "MovingError", "OperatingPoint", "steady"]
+__all__ = ["Method", "OperatingPoint", "steady"]

@@ -21,8 +21,9 @@ from scipy import sparse
 from scipy.linalg import lapack
 from scipy.sparse.linalg import LinearOperator, onenormest, splu
 
-from crescentlab.analysis.steady.closed import ClosedSet, Ledger
-from crescentlab.analysis.steady.rest import Matrix, Point, Site
+from crescentlab.analysis.steady.closed import Ledger
+from crescentlab.analysis.steady.rest import Point, Site
+from crescentlab.closed_sets import ClosedSet, Matrix
 from crescentlab.errors import SimulationError
 
 Array = np.ndarray
@@ -63,6 +64,7 @@ class Linear:
     singular: bool = False
 
     def __post_init__(self) -> None:
+        self.point = self.site.levelled(self.point)
         self.F, self.slope = self.site.rates(self.point)
         if not (np.isfinite(self.F).all() and np.isfinite(self.slope.data).all()):
             raise NoRestError("its rates are not finite numbers")
@@ -126,23 +128,32 @@ class Linear:
         if self.solve is not None:
             full[self.active] = self.solve(right)
             return full, 0.0
-        kept = self.invariants(self.dense)
-        both, zeros = np.vstack([self.dense, kept]), np.zeros(kept.shape[0])
-        full[self.active] = np.linalg.lstsq(both, np.append(right, zeros), rcond=SINGULAR)[0]
+        full[self.active] = self.inverse @ right
         return full, float(np.abs(self.dense @ full[self.active] - right).max())
 
-    def invariants(self, dense: Array) -> Array:
+    @functools.cached_property
+    def decomposed(self) -> tuple[Array, Array, Array]:
+        """Singular values, and the directions of rows and of columns that belong to those that are 0."""
+        left, values, right = np.linalg.svd(self.dense)
+        zero = values <= SINGULAR * values[0]
+        return values, left[:, zero], right[zero].T
+
+    @functools.cached_property
+    def inverse(self) -> Array:
+        """Of the matrix with its invariants below it: the nearest solution that keeps them; shape (m, m)."""
+        kept = self.invariants()
+        return np.asarray(np.linalg.pinv(np.vstack([self.dense, kept]), rcond=SINGULAR)[:, : len(self.dense)])
+
+    def invariants(self) -> Array:
         """Sums of the unknowns, in their own sizes, that no rate changes: w J = 0; shape (k, m)."""
-        left, values, _ = np.linalg.svd(dense)
-        rows = (left[:, values <= SINGULAR * values[0]].T / self.rows) * self.columns[self.active]
+        rows = (self.decomposed[1].T / self.rows) * self.columns[self.active]
         return np.asarray(rows / np.abs(rows).max(axis=1, initial=0.0, keepdims=True))
 
     def open_directions(self) -> Array:
         """Directions of the active unknowns, in their own sizes, along which nothing changes; shape (m, k)."""
         if not self.singular or self.active.size > LARGEST_DENSE:
             return np.zeros((self.active.size, 0))
-        _, values, right = np.linalg.svd(self.dense)
-        return np.asarray(right[values <= SINGULAR * values[0]].T)
+        return self.decomposed[2]
 
 
 def moving(F: Array, slope: Matrix) -> Array:
@@ -227,7 +238,7 @@ class Newton:
             step, left = linear.correction(point, linear.F)
             size = largest(step)
             if size <= self.tolerance and left <= self.tolerance:
-                return self.polished(Found(point, linear, max(size, left), self.iterations), step)
+                return self.polished(Found(linear.point, linear, max(size, left), self.iterations), step)
             point = self.shortened(linear, step, size)
         raise NoRestError(f"no convergence within {MOST} iterations")
 

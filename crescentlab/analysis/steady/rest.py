@@ -4,8 +4,13 @@
           F_h = \\frac{T(t + \\Delta t, \\tilde x, h) - h}{\\Delta t} = 0
 
 x [SI] states that do not count, h [SI] held values that ticks set and that do not count; T, x^+ what the tick of period
-\\Delta t [s] makes of them; \\tilde x are the states with the counters (``counts=True``) moved on by their rate times
-\\Delta t. F are rates, in the unknowns' units per second; they vanish where one tick after the other changes nothing.
+\\Delta t [s] makes of them; \\tilde x are the states with the counters (``counts=True``) moved on by \\Delta t times
+the mean of their rates when the tick's interval begins and in its middle: at rest a rate is the same at both, and where
+held values are interpolated in between, this is what says so. F are rates, in the unknowns' units per second; they
+vanish where one tick after the other changes nothing.
+
+A held value that a tick merely copies, T_i = h_j or x_j (a register that shifts, a sample), is at rest what it is
+copied from, so only the first of a register is an unknown.
 Events' held values and bits are given: :class:`Site` brings them to rest.
 """
 
@@ -17,8 +22,8 @@ from typing import Any
 
 import casadi as ca
 import numpy as np
-from scipy import sparse
 
+from crescentlab.closed_sets import Matrix, empty_matrix, nonzeros
 from crescentlab.errors import SimulationError
 from crescentlab.prepared import Evaluator, Prepared, jacobian, prepare
 from crescentlab.solvers.hybrid import Hybrid
@@ -28,9 +33,6 @@ from crescentlab.system import System, Values
 from crescentlab.units import Quantity
 
 Array = np.ndarray
-Matrix = Any
-"""A sparse matrix of SciPy, its columns compressed."""
-
 RUNAWAY = 1e6
 """An unknown this many times its nominal size plus magnitude at the start has run away."""
 
@@ -59,6 +61,17 @@ class Equations:
     """Places of the unknowns among the states, shape (n_x,)."""
     held: Array
     """Places of the unknowns among the held values, shape (n_h,)."""
+    copies: Array
+    """Places of the held values that ticks copy from an unknown, shape (n_c,)."""
+    own: Array
+    """Which unknown each of states, held and copies is, shape (n_x + n_h + n_c,)."""
+    n: int
+    """Number of all states."""
+
+    @property
+    def places(self) -> Array:
+        """Of states, held and copies among states and held values, one after the other."""
+        return np.concatenate([self.states, self.n + self.held, self.n + self.copies])
 
 
 def equations(system: System, groups: tuple[int, ...]) -> Equations:
@@ -68,23 +81,59 @@ def equations(system: System, groups: tuple[int, ...]) -> Equations:
 
 
 def _equations(system: System, groups: tuple[int, ...]) -> Equations:
-    x_rate, h_rate = _rates(system, groups)
+    x_rate, h_rate, after = _rates(system, groups)
     states = np.flatnonzero(~system.counting_states)
     set_by_ticks = np.array([not h_rate[k].is_zero() for k in range(h_rate.numel())], dtype=bool)
-    held = np.flatnonzero(set_by_ticks & ~system.counting_held)
+    ticked = np.flatnonzero(set_by_ticks & ~system.counting_held)
+    sources = _sources(system, states, ticked, after)
+    copies = np.array(sorted(sources), dtype=int)
+    held = np.setdiff1d(ticked, copies)
+    n = system.x.numel()
+    number = {int(place): k for k, place in enumerate([*states, *(n + held)])}
+    own = np.array([*range(len(number)), *(number[sources[k]] for k in copies.tolist())], dtype=int)
     F = ca.vertcat(picked(x_rate, states), picked(h_rate, held))
-    y = unknowns(system, states, held)
-    slope = jacobian(F, y)
     x_counts, h_counts = np.flatnonzero(system.counting_states), np.flatnonzero(system.counting_held)
+    rates = ca.vertcat(ca.SX(1), picked(x_rate, x_counts), picked(h_rate, h_counts))
+    if copies.size:
+        h = ca.SX(system.h)
+        h[copies.tolist()] = ca.vertcat(system.x, system.h)[[sources[k] for k in copies.tolist()]]
+        inner = ca.Function("rest", system.arguments, [ca.densify(F), ca.densify(rates)])
+        F, rates = inner(system.t, system.x, h, system.b, system.p)
+    y = ca.vertcat(picked(system.x, states), picked(system.h, held))
+    slope = jacobian(F, y)
     counters = ca.vertcat(system.t, picked(system.x, x_counts), picked(system.h, h_counts))
     drift = ca.jacobian(F, counters)
-    rates = ca.vertcat(ca.SX(1), picked(x_rate, x_counts), picked(h_rate, h_counts))
     arguments = system.arguments[:-1]
     return Equations(
         prepare("rest", arguments, system.p, [F, nonzeros(slope)]), slope.sparsity(),
         prepare("drift", arguments, system.p, [nonzeros(drift), rates], seldom=True), drift.sparsity(),
-        states, held,
+        states, held, copies, own, n,
     )  # fmt: skip
+
+
+def _sources(system: System, states: Array, ticked: Array, after: list[ca.SX]) -> dict[int, int]:
+    """Held values that ticks copy, and where from among states and held values: what they set is a mere symbol.
+
+    Followed to the first of a register; of one that is closed to a ring its first place stays.
+    """
+    n = system.x.numel()
+    symbols = ca.vertcat(system.x, system.h)
+    places = [*states.tolist(), *(n + ticked).tolist()]
+    known = {symbols[k].element_hash(): k for k in places}
+    from_place: dict[int, int] = {}
+    for k in ticked.tolist():
+        new = after[k]
+        source = known.get(new.element_hash()) if new.is_symbolic() else None
+        if source is not None and source != n + k:
+            from_place[n + k] = source
+    first: dict[int, int] = {}
+    for place in sorted(from_place):
+        seen, at = {place}, place
+        while at in from_place and from_place[at] not in seen:
+            at = from_place[at]
+            seen.add(at)
+        first[place] = min(seen) if at in from_place else at
+    return {place - n: source for place, source in first.items() if source != place}
 
 
 def picked(vector: ca.SX, places: Array) -> ca.SX:
@@ -92,22 +141,16 @@ def picked(vector: ca.SX, places: Array) -> ca.SX:
     return vector[places.tolist()] if places.size else ca.SX(0, 1)
 
 
-def unknowns(system: System, states: Array, held: Array) -> ca.SX:
-    """The symbols of the unknowns y."""
-    return ca.vertcat(picked(system.x, states), picked(system.h, held))
+def _rates(system: System, groups: tuple[int, ...]) -> tuple[ca.SX, ca.SX, list[ca.SX]]:
+    """Rates of all states and held values, what ticks do spread over their period, and what they set held values to.
 
-
-def nonzeros(matrix: ca.SX) -> ca.SX:
-    """Nonzeros in column order, one below the other."""
-    return ca.reshape(matrix.nz[:], matrix.nnz(), 1)
-
-
-def _rates(system: System, groups: tuple[int, ...]) -> tuple[ca.SX, ca.SX]:
-    """Rates of all states and held values, what ticks do spread over their period."""
+    What several of them set is shown as none of them sets it.
+    """
     x_rate, h_rate = system.f, ca.SX.zeros(system.h.numel())
+    set_to = list(ca.vertsplit(system.h)) if system.h.numel() else []
     ticking = [k for k, event in enumerate(system.events) if event.kind == "every"]
     if not ticking:
-        return x_rate, h_rate
+        return x_rate, h_rate, set_to
     after = tick(system)
     fired = np.zeros(len(system.events))
     fired[ticking] = 1.0
@@ -115,19 +158,25 @@ def _rates(system: System, groups: tuple[int, ...]) -> tuple[ca.SX, ca.SX]:
     h = ca.SX(system.h)
     for k in np.flatnonzero(system.counting_held).tolist():
         h[k] = counted[k]
-    f = ca.Function("f", system.arguments, [system.f])(system.t, system.x, h, system.b, system.p)
+    f = ca.Function("f", system.arguments, [ca.densify(system.f)])
+    begin = f(system.t, system.x, h, system.b, system.p)
     counts = ca.DM(system.counting_states.astype(float))
-    x_rate, h_rate = f, ca.SX.zeros(system.h.numel())
+    x_rate = begin
     for group in range(max(groups) + 1):
         members = [k for k, of in enumerate(groups) if of == group]
         dt = system.periods[members[0]]
-        x_on = system.x + counts * f * dt
+        middle = f(system.t + dt / 2, system.x + counts * begin * dt / 2, h, system.b, system.p)
+        x_on = system.x + counts * (begin + middle) / 2 * dt
         fired = np.zeros(len(system.events))
         fired[[ticking[k] for k in members]] = 1.0
         new_x, new_h = after(system.t + dt, x_on, h, system.b, system.p, fired)
         x_rate = x_rate + (new_x - x_on) / dt
-        h_rate = h_rate + (new_h - h) / dt
-    return x_rate, h_rate
+        change = (new_h - h) / dt
+        for k in range(h.numel()):
+            if not change[k].is_zero():
+                set_to[k] = new_h[k] if h_rate[k].is_zero() else system.h[k]
+        h_rate = h_rate + change
+    return x_rate, h_rate, set_to
 
 
 def tick(system: System) -> ca.Function:
@@ -150,26 +199,20 @@ class Site:
         """Periods of the ticks [s]; equal ones stand once."""
         self.equations = equations(system, tuple(int(k) for k in np.searchsorted(self.periods, rounded)))
         self._rest = Evaluator(self.equations.function, values.p)
-        self._slope = self.slopes(self.equations.pattern)
-        self.limits = PressureLimits(system)
+        self._slope = empty_matrix(self.equations.pattern)
+        self.limits = PressureLimits(system, values.p)
         states, held = self.equations.states, self.equations.held
         self.n_x = states.size
         self.names = [system.state_names[k] for k in states] + [system.held_names[k] for k in held]
         self.quantities: list[Quantity] = [system.state_quantities[k] for k in states]
         self.quantities += [system.held_quantities[k] for k in held]
         self.nominal = np.append(system.nominal[states], [system.held_quantities[k].nominal for k in held])
-        floors = [self.limits.states[1][states], self.limits.held[1][held]]
+        floors = [self.limits.states.lowest[states], self.limits.held.lowest[held]]
         self.floors = np.concatenate(floors)
         """Lowest possible values: absolute zero of pressures, else -inf."""
         self.bound = np.full(self.nominal.size, np.inf)
         """Magnitudes beyond which unknowns have run away."""
         self.evaluations = 0
-
-    @staticmethod
-    def slopes(pattern: ca.Sparsity) -> Matrix:
-        """An empty matrix of this sparsity, whose data are set later."""
-        rows, start = np.array(pattern.row(), dtype=np.int32), np.array(pattern.colind(), dtype=np.int32)
-        return sparse.csc_matrix((np.zeros(rows.size), rows, start), shape=pattern.shape)
 
     # -- unknowns --------------------------------------------------------------------------------
 
@@ -181,7 +224,12 @@ class Site:
         """The point with other unknowns, its bits not settled yet."""
         x, h = point.x.copy(), point.h.copy()
         x[self.equations.states], h[self.equations.held] = y[: self.n_x], y[self.n_x :]
+        h[self.equations.copies] = y[self.equations.own[y.size :]]
         return replace(point, x=x, h=h)
+
+    def levelled(self, point: Point) -> Point:
+        """The point with all copies as what they are copied from."""
+        return self.moved(point, self.unknowns(point)) if self.equations.copies.size else point
 
     def scale(self, y: Array) -> Array:
         """Size of each unknown, by which its changes are judged."""
@@ -203,7 +251,7 @@ class Site:
     def drift(self, point: Point, ahead: float = 0.0) -> tuple[Matrix, Array]:
         """dF/dc and dc/dt of the time and of what counts, ``ahead`` [s] after the frozen time."""
         nonzeros, rates = Evaluator(self.equations.drift, self.values.p)(self.t + ahead, point.x, point.h, point.b)
-        slope = self.slopes(self.equations.drift_pattern)
+        slope = empty_matrix(self.equations.drift_pattern)
         slope.data[:] = nonzeros
         return slope, rates.copy()
 

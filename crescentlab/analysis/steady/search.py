@@ -8,27 +8,31 @@ end.
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Literal
 
 import numpy as np
 
+from crescentlab import arguments
 from crescentlab.analysis.steady.closed import Ledger
 from crescentlab.analysis.steady.newton import Found, Newton, NoRestError
 from crescentlab.analysis.steady.pseudo_transient import PseudoTransient
 from crescentlab.analysis.steady.rest import Point, Site
 from crescentlab.analysis.steady.stability import stability
 from crescentlab.analysis.steady.timing import changing
-from crescentlab.analysis.steady.unrest import check_drift, resisting, some
-from crescentlab.circuit import Circuit, Start, snapshot_of
+from crescentlab.analysis.steady.unrest import check_drift, resisting
+from crescentlab.arguments import Settings
+from crescentlab.circuit import Circuit, Start, check_circuit, snapshot_of
+from crescentlab.closed_sets import some
 from crescentlab.elaborate import Design
-from crescentlab.errors import InputError, SimulationError, UnitError
+from crescentlab.errors import InputError, SimulationError
 from crescentlab.result import Result
 from crescentlab.solvers.integrate import integrate
 from crescentlab.solvers.options import Options
+from crescentlab.solvers.ranges import beyond_ranges
 from crescentlab.solvers.snapshot import Snapshot
-from crescentlab.solvers.trajectory import Recording, Statistics, Trajectory
+from crescentlab.solvers.trajectory import Recording, Rows, Statistics, Trajectory
 from crescentlab.system import System, Values
 from crescentlab.units import QUANTITIES
 
@@ -61,7 +65,7 @@ class OperatingPoint:
     resting: tuple[str, ...]
     """Unknowns held fast by the mode they are in: a mass on its stop."""
     time_constant: float | None
-    """Slowest way back to the point [s]; None if not known."""
+    """Slowest way back to the point [s]; None if not known, or if there is none."""
     wall_s: float
     warnings: tuple[str, ...] = ()
     result: Result = field(init=False, repr=False)
@@ -73,9 +77,14 @@ class OperatingPoint:
         one.trajectory.statistics.wall_s = self.wall_s
         object.__setattr__(self, "result", one)
 
+    def __repr__(self) -> str:
+        """How it was found, and its figures."""
+        found = f"by {self.method}, residual {self.residual:.1e}, {self.unknowns} unknowns"
+        return f"<OperatingPoint {self.result.title!r}: {found}; {self.result.summed_up()}>"
+
 
 def steady(
-    circuit: Circuit, parameters: Mapping[str, str] | None = None, *, start: Start | None = None,
+    circuit: Circuit, parameters: Settings | None = None, *, start: Start | None = None,
     at: str | float | None = None, tolerance: float = 1e-9, progress: Callable[[float], None] | None = None,
 ) -> OperatingPoint:  # fmt: skip
     """Find the operating point of a circuit near its start values, or near where another run ended (``start``).
@@ -84,6 +93,8 @@ def steady(
     unknown, over its nominal size plus magnitude. Raises :class:`InputError` where there is no steady state, and
     :class:`SimulationError` naming the equations that resist where none is found.
     """
+    check_circuit(circuit, "steady")
+    tolerance = arguments.number(tolerance, "tolerance", "1e-9")
     if not SMALLEST_TOLERANCE <= tolerance < 1:
         raise InputError(f"tolerance {tolerance:g}: write a number from 1e-13 to below 1, for example 1e-9")
     design = circuit.design(parameters)
@@ -97,13 +108,7 @@ def steady(
 
 
 def _instant(at: str | float | None) -> float | None:
-    try:
-        t = QUANTITIES["time"].parse(at) if isinstance(at, str) else at
-    except UnitError:
-        raise InputError(f"--at {at}: a time is a number with its unit; write for example 20 ms") from None
-    if t is not None and not np.isfinite(t):
-        raise InputError(f"at: {t} is no time; write for example 20 ms")
-    return t
+    return None if at is None else arguments.quantity(at, "at", QUANTITIES["time"])
 
 
 class _Search:
@@ -198,6 +203,7 @@ class _Search:
             if said is not None
         ]
         warnings += self.undecided(found)
+        warnings += beyond_ranges(self.system, self.values.p, _row(self.site.snapshot(point)))
         slowest = None
         seen = stability(self.site, point, linear.active)
         if isinstance(seen, str):
@@ -235,8 +241,12 @@ class _Search:
         return one.display_unit(quantity)  # type: ignore[arg-type]
 
 
-def _one_row(system: System, values: Values, design: Design, at: Snapshot, solver: str) -> Result:
+def _row(at: Snapshot) -> Rows:
     rows = Recording()
     rows.add(at.t, at.x, at.h, at.b)
-    trajectory = Trajectory(rows.done(), None, [], Statistics(), solver, end=at)
+    return rows.done()
+
+
+def _one_row(system: System, values: Values, design: Design, at: Snapshot, solver: str) -> Result:
+    trajectory = Trajectory(_row(at), None, [], Statistics(), solver, end=at)
     return Result(system, values, design, trajectory)

@@ -47,7 +47,7 @@ class Stability:
     undamped: Mode | None
     """A mode that swings for ever, None if none does."""
     slowest: float | None
-    """Largest time constant [s] of the modes that die away."""
+    """Largest time constant [s], where all modes die away: else a disturbance does not, and there is none."""
 
     def warnings(self) -> list[str]:
         """What a transient would do to the point."""
@@ -61,15 +61,16 @@ class Stability:
 
 
 def stability(site: Site, point: Point, active: Array) -> Stability | str:
-    """Of the unknowns ``active``; in words, why they were not looked at."""
-    if active.size > MOST:
+    """Of the unknowns ``active``, copies with them; in words, why they were not looked at."""
+    places = site.equations.places[np.isin(site.equations.own, active)]
+    if places.size > MOST:
         return f"not looked at, more than {MOST} unknowns"
     if site.periods.size > 1:
         return "not looked at, ticks of several periods"
-    if not active.size:
+    if not places.size:
         return Stability(None, None, None)
     try:
-        matrix = _matrix(site, point)[np.ix_(active, active)]
+        matrix = _matrix(site, point)[np.ix_(places, places)]
     except SimulationError as error:
         return f"not looked at, {error}"
     values = np.linalg.eigvals(matrix)
@@ -83,11 +84,13 @@ def stability(site: Site, point: Point, active: Array) -> Stability | str:
         if not which.any():
             return None
         k = int(np.argmax(np.where(which, exponents.real, -np.inf)))
-        return Mode(complex(exponents[k]), site.names[active[_partaking(matrix, values[k])]])
+        return Mode(complex(exponents[k]), names[places[_partaking(matrix, values[k])]])
 
+    names = [*site.system.state_names, *site.system.held_names]
     swings, dying = np.abs(exponents.imag) > rounding, exponents.real < -rounding
-    slowest = float(np.max(-1 / exponents.real[dying])) if dying.any() else None
-    return Stability(mode(exponents.real > rounding), mode((np.abs(exponents.real) <= rounding) & swings), slowest)
+    growing, undamped = mode(exponents.real > rounding), mode((np.abs(exponents.real) <= rounding) & swings)
+    lasting = growing is not None or undamped is not None or not dying.any()
+    return Stability(growing, undamped, None if lasting else float(np.max(-1 / exponents.real[dying])))
 
 
 def _partaking(matrix: Array, value: complex) -> int:
@@ -98,17 +101,18 @@ def _partaking(matrix: Array, value: complex) -> int:
 
 
 def _matrix(site: Site, point: Point) -> Array:
-    """In units of the site's scale: dF/dy, or with ticks the map of the unknowns over one of them; shape (N, N)."""
-    system, states, held = site.system, site.equations.states, site.equations.held
-    if not site.periods.size:
-        scale = site.scale(site.unknowns(point))
-        return np.asarray(site.rates(point)[1].toarray() * scale / scale[:, None])
+    """Of all states and held values, scaled: df/dx of the states, or with ticks the map over one of them; (n + k)^2."""
+    system = site.system
     sizes = np.append(system.nominal, [quantity.nominal for quantity in system.held_quantities])
     sizes += np.abs(np.append(point.x, point.h))
     at = derivatives.Point(site.t, point.x, point.h, point.b, site.values.p)
+    if not site.periods.size:
+        matrix = np.zeros((sizes.size,) * 2)
+        places = site.equations.states
+        matrix[np.ix_(places, places)] = site.rates(point)[1].toarray()
+        return np.asarray(matrix * sizes / sizes[:, None])
     local = derivatives.Derivatives(system, [], [])
     found = tick_map(local, at, float(site.periods[0]), np.zeros((0, 0)), sizes)
     if found.doubt:
         raise SimulationError(found.doubt)
-    places = np.append(states, system.x.numel() + held)
-    return np.asarray(found.matrix[np.ix_(places, places)])
+    return found.matrix

@@ -8,7 +8,8 @@ import casadi as ca
 import numpy as np
 
 from crescentlab.analysis.steady.rest import Point, Site
-from crescentlab.analysis.steady.unrest import NAMED, ROUNDING, some, timed
+from crescentlab.analysis.steady.unrest import ROUNDING, timed
+from crescentlab.closed_sets import NAMED, some
 from crescentlab.system import System
 
 Array = np.ndarray

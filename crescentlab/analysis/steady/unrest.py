@@ -8,7 +8,8 @@ import numpy as np
 
 from crescentlab.analysis.steady.closed import Ledger
 from crescentlab.analysis.steady.rest import Point, Site
-from crescentlab.errors import InputError
+from crescentlab.closed_sets import NAMED, some
+from crescentlab.errors import InputError, MovingError
 from crescentlab.units import QUANTITIES, Quantity
 
 Array = np.ndarray
@@ -17,18 +18,8 @@ Unit = Callable[[Quantity], str]
 
 ROUNDING = 1e-9
 """Share of the largest term below which a sum counts as rounding."""
-NAMED = 3
-"""Most equations that are named."""
 PROBES = (0.0, 0.0123, 0.317)
 """Times [s] after the present one at which dependence on the time is looked for, so that no extremum hides it."""
-
-
-class MovingError(InputError):
-    """The time itself keeps a circuit from coming to rest: ``why``, and what to do then."""
-
-    def __init__(self, why: str, advice: str) -> None:
-        super().__init__(f"{why}; {advice}")
-        self.why = why
 
 
 def check_drift(site: Site, point: Point, *, frozen: bool) -> str | None:
@@ -108,12 +99,6 @@ def _listed(site: Site, rows: Array) -> str:
     return f"the rate{'s' if rows.sum() > 1 else ''} of {some([site.names[k] for k in np.flatnonzero(rows)])}"
 
 
-def some(names: list[str]) -> str:
-    """The first few of the names."""
-    more = len(names) - NAMED
-    return ", ".join(names[:NAMED]) + (f" and {more} more" if more > 0 else "")
-
-
 def resisting(site: Site, point: Point, ledger: Ledger, unit: Unit) -> str:
     """The rates that are largest in their unknowns' own sizes, and volumes fed without a way out."""
     F, _ = site.rates(point)
@@ -121,9 +106,5 @@ def resisting(site: Site, point: Point, ledger: Ledger, unit: Unit) -> str:
     worst = [int(k) for k in np.argsort(-speed)[:NAMED] if speed[k] > 0]
     shown = ", ".join(f"{site.names[k]} ({site.show_rate(k, float(F[k]), unit)})" for k in worst)
     said = f"what resists most: {shown}" if shown else "nothing resists, but the equations depend on each other"
-    flow = QUANTITIES["flow"]
-    for each in ledger.closed(point, fed=True):
-        inside, much = some([ledger.names[k] for k in each.members]), flow.show(abs(each.net), unit(flow), 3)
-        way = f"into {inside} has no way out" if each.net > 0 else f"out of {inside} comes from nowhere"
-        said += f"; the flow of {much} {way}"
-    return said
+    ways = ledger.sets.without_way_out(site.t, point.x, point.h, point.b, unit)
+    return "; ".join([said, *ways])

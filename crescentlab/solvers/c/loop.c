@@ -115,6 +115,14 @@ static void now_switched(Run *r)
     if (r->curved_held) r->rescan = 1;
 }
 
+/* Count how closely the turns of an event or, behind the events, of a relation follow one another. */
+static void turned(Run *r, int64_t k)
+{
+    const int close = r->steps - r->storm_last[k] < r->storm_steps;
+    r->storm_last[k] = r->steps;
+    if (r->storm_row[k] < r->storm_count) r->storm_row[k] = close ? r->storm_row[k] + 1 : 0;
+}
+
 /* Let held values that follow a schedule take the row that holds from now on. */
 static void follow(Run *r)
 {
@@ -148,6 +156,8 @@ static int settle(Run *r, int onward)
                 r->culprit = other;
                 return UNSETTLED;
             }
+        for (int64_t k = 0; k < r->n_bits; k++)
+            if (r->want[k] != r->b[k]) turned(r, r->n_events + k);
         memcpy(r->b, r->want, r->n_bits * sizeof *r->b);
         now_switched(r);
     }
@@ -171,6 +181,7 @@ static void log_event(Run *r, int64_t event)
 {
     r->log_t[r->logs] = r->t;
     r->log_event[r->logs++] = event;
+    turned(r, event);
     if (r->kind[event] == EVERY)
         r->ticks++;
     else

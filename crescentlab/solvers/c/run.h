@@ -122,6 +122,10 @@ typedef struct Run {
     int64_t switched; /* whether it changed held values or bits */
     double *recent; /* (n_events, ZENO_COUNT) last times of each event */
     int64_t *fired; /* (n_events) how often it fired */
+    int64_t *storm_last; /* (n_events + n_bits) steps when each last turned */
+    int64_t *storm_row; /* (n_events + n_bits) turns in a row with fewer than storm_steps between */
+    int64_t storm_steps;
+    int64_t storm_count; /* so many are a storm, and stay one */
     double zeno_span; /* this many firings within this time are endless */
 
     /* scratch of the loop */
@@ -140,6 +144,8 @@ typedef struct Run {
     double *coef; /* (degree + 1, n) */
     double *stages; /* (stages, n) */
     double *work; /* (n) */
+    double rate_of_fastest; /* explicit methods: |lambda| of what is fastest in the candidate ... */
+    double rate_of_fastest_last; /* ... and in the step before */
 
     /* static sparse LU of I/(gamma h) - df/dx, rows in elimination order (lu.c) */
     int64_t *row; /* (n + 1) first entry of each row */
