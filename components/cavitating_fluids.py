@@ -78,6 +78,11 @@ class _Evaporating(Fluid):
             )
         return self
 
+    @property
+    def cavity_pressure(self) -> Any:
+        """Pressure [Pa, gauge] at which it evaporates."""
+        return self._vapour()[0] - self.atmospheric_pressure
+
     def density(self, p: Expr) -> Expr:
         """rho(p) [kg/m^3]."""
         rho: Expr = self._liquid_density() / self._specific_volume(p)[0]

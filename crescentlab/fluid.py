@@ -55,6 +55,11 @@ class Fluid(BaseModel):
         """nu(p) [m^2/s]."""
         raise NotImplementedError
 
+    @property
+    def cavity_pressure(self) -> Any:
+        """Pressure [Pa, gauge] at which it evaporates; None for a fluid without vapour."""
+        return None
+
     def dynamic_viscosity(self, p: Expr) -> Expr:
         """mu(p) = rho nu [Pa s]."""
         return self.density(p) * self.kinematic_viscosity(p)
