@@ -158,7 +158,7 @@ class _CompiledRun:
             recent=_room(r.n_events * native.LIMITS["ZENO_COUNT"]), fired=_whole(np.zeros(r.n_events)),
         )  # fmt: skip
         r.curved = hybrid.curved.size
-        r.curved_held = int(bool(r.curved) and bool(system.bits.held_dependent[hybrid.curved].any()))
+        r.curved_held = int(hybrid.anew)
         r.curved_next = self.options.start
         r.give(storm_last=self.storms.last, storm_row=self.storms.row)
         r.storm_steps, r.storm_count = STORM_STEPS, STORM_COUNT
@@ -301,6 +301,7 @@ class _CompiledRun:
         r = self.run_
         if r.curved_held:
             self.hybrid.scanned = None
+            self.hybrid.origin, self.hybrid.ticked = r.kept["origin"][: r.n_ticks], r.kept["ticked"][: r.n_ticks]
         r.curved_next = self.hybrid.next_curved_root(r.t, self.x)
         r.rescan = 0
         self.library.find_goal(ctypes.byref(r))
