@@ -28,6 +28,10 @@ from .oil_grades import GRADES
 from .viscosity_laws import CST, barus_factor, walther_viscosity, wooster_coefficient
 
 ZERO_CELSIUS = 273.15
+COLDEST, HOTTEST = ZERO_CELSIUS - 50, ZERO_CELSIUS + 150
+"""Temperatures [K] between which API MPMS 11.1 gives the density of oils: -58 to 302 degF."""
+THINNEST = 2e-6
+"""Viscosity [m^2/s] from which on ASTM D341 draws a straight line; thinner oils need its further terms."""
 GAS_CONSTANT_OF_STEAM = 461.526
 """Specific gas constant of water [J/(kg K)]."""
 
@@ -77,6 +81,11 @@ class _Evaporating(Fluid):
                 f"(1 + vapour_range) must lie below {self.atmospheric_pressure / 1e5:g} bar; lower one of them"
             )
         return self
+
+    @property
+    def cavity_pressure(self) -> Any:
+        """Pressure [Pa, gauge] at which it evaporates."""
+        return self._vapour()[0] - self.atmospheric_pressure
 
     def density(self, p: Expr) -> Expr:
         """rho(p) [kg/m^3]."""
@@ -240,6 +249,21 @@ class MineralOil(_Evaporating, _DataSheet):
     air_fraction: Ratio = Field(default=5e-3, ge=0, lt=1, description="gas volume over total volume at the atmosphere")
     vapour_pressure: Pressure = Field(default=1e3, gt=0, description="absolute pressure at which the oil evaporates")
     vapour_density: Density = Field(default=0.02, gt=0, description="density of the vapour at the vapour pressure")
+
+    def remarks(self) -> list[str]:
+        """Temperatures beyond the tables of the density, and viscosities below the chart's straight line."""
+        celsius, viscosity = self.temperature - ZERO_CELSIUS, float(self._viscosity_at(self.temperature))
+        if not COLDEST <= self.temperature <= HOTTEST:
+            low, high = COLDEST - ZERO_CELSIUS, HOTTEST - ZERO_CELSIUS
+            return [
+                f"its temperature is {celsius:.4g} degC; the law of its density is meant for {low:g} to {high:g} degC"
+            ]
+        if viscosity < THINNEST:
+            return [
+                f"its viscosity is {viscosity / CST:.3g} cSt at {celsius:.4g} degC; the straight line of the viscosity "
+                f"chart is meant from {THINNEST / CST:g} cSt on"
+            ]
+        return []
 
     def kinematic_viscosity(self, p: Expr) -> Expr:
         """nu(p) [m^2/s] of the liquid: mu_0 exp(alpha p)/rho_l(p)."""

@@ -87,6 +87,24 @@ def evaluate(
     return result
 
 
+def names_in(text: str) -> set[str]:
+    """Names that an expression asks for, those of functions left out; none for text that is no expression."""
+    try:
+        tree, literals = _parse(text.removeprefix("=").strip())
+    except ExpressionError:
+        return set()
+    found: set[str] = set()
+    todo: list[ast.AST] = [tree]
+    while todo:
+        node = todo.pop()
+        name = _dotted(node)
+        if name is not None:
+            found.add(name)
+        else:
+            todo += node.args if isinstance(node, ast.Call) else ast.iter_child_nodes(node)
+    return found - literals.keys() - {"pi"}
+
+
 def number_of(value: Value, quantity: Quantity) -> float:
     """The SI number of an expression that must give ``quantity``."""
     if isinstance(value.value, (str, bool, np.bool_)):

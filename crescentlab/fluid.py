@@ -43,6 +43,10 @@ class Fluid(BaseModel):
         default=HIGHEST_PRESSURE, gt=0, description="gauge pressure up to which its law is meant; beyond, a run warns"
     )
 
+    def remarks(self) -> list[str]:
+        """Sentences on numbers for which its laws are not meant; `check` and runs warn of them."""
+        return []
+
     def density(self, p: Expr) -> Expr:
         """rho(p) [kg/m^3]."""
         raise NotImplementedError
@@ -54,6 +58,11 @@ class Fluid(BaseModel):
     def kinematic_viscosity(self, p: Expr) -> Expr:
         """nu(p) [m^2/s]."""
         raise NotImplementedError
+
+    @property
+    def cavity_pressure(self) -> Any:
+        """Pressure [Pa, gauge] at which it evaporates; None for a fluid without vapour."""
+        return None
 
     def dynamic_viscosity(self, p: Expr) -> Expr:
         """mu(p) = rho nu [Pa s]."""

@@ -80,6 +80,12 @@ class SimulationSection(_Section):
     )
     output_step: Time | None = Field(default=None, gt=0, description="uniform output grid; default the accepted steps")
     compile: bool | None = Field(default=None, description="compile the equations; default where it pays")
+    start: Literal["steady"] | None = Field(
+        default=None, description="steady: the run begins at the operating point; default: at the start values"
+    )
+    start_pressure: str | None = Field(
+        default=None, description="start pressure of every part that states none of its own; an expression too"
+    )
     stop_when: str | None = Field(default=None, description="a condition that ends the run: line.p > 9 bar")
     period: str | None = Field(
         default=None, description="time after which the circuit repeats itself, an expression too: '= 2 * pi / speed'"
@@ -171,7 +177,8 @@ class Netlist:
 
 
 _KINDS: dict[str, tuple[type, str]] = {
-    "fluid": (dict, "{type: simple_oil, density: 860 kg/m^3}"), "fluids": (dict, "{oil: {type: simple_oil}}"),
+    "fluid": (dict, "{type: water, temperature: 20 degC}"),
+    "fluids": (dict, "{coolant: {type: water, temperature: 20 degC}}"),
     "parameters": (dict, "{supply: 30 L/min}"), "components": (dict, "{tank: {type: tank}}"),
     "ports": (dict, "{inlet: p_line}"),
     "nets": (dict, "{p_line: [pump.port, line.port]}"), "outputs": (dict, "{loss: '= line.p * valve.q'}"),
@@ -195,7 +202,7 @@ def _collections(node: Node) -> None:
         if not isinstance(node.find(("nets", name)).value, dict):
             _shaped(node, ("nets", name), list, "[pump.port, line.port]")
     for name in _keys(node, "fluids"):
-        _shaped(node, ("fluids", name), dict, "{type: simple_oil, density: 860 kg/m^3}")
+        _shaped(node, ("fluids", name), dict, "{type: water, temperature: 20 degC}")
 
 
 def _keys(node: Node, section: str) -> list[str]:

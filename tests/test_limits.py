@@ -248,9 +248,50 @@ def test_settings_above_the_range_warn_at_check(refused: Refusal) -> None:
     assert warning.startswith(
         "valve.cracking_pressure is 1500 bar, above 1000 bar, up to which the law of simple_oil is meant"
     )
-    assert "warning     valve.cracking_pressure is 1500 bar" in refused.run("check", "c.yaml")[1]
+    assert "  warning: valve.cracking_pressure is 1500 bar" in refused.run("check", "c.yaml")[1]
     for setting in ("valve.cracking_pressure=150 bar", "fluid.highest_pressure=2000 bar"):
         assert json.loads(refused.run("check", "c.yaml", "--json", "--set", setting)[1])["warnings"] == []
+
+
+@pytest.mark.parametrize(
+    ("temperature", "said"),
+    [
+        ("170 degC", r"fluid: its temperature is 170 degC; the law of its density is meant for -50 to 150 degC$"),
+        ("-60 degC", r"fluid: its temperature is -60 degC; "),
+        ("130 degC", r"fluid: its viscosity is 1\.72 cSt at 130 degC; the straight line .* is meant from 2 cSt on$"),
+        ("40 degC", None),
+    ],
+)
+def test_an_oil_beyond_its_temperatures_warns(refused: Refusal, temperature: str, said: str | None) -> None:
+    """A thin oil of 10 and 2.6 cSt at 40 and 100 degC has 1.72 cSt at 130 degC by the straight line of ASTM D341."""
+    oil = f"density_15: 850 kg/m^3, viscosity_1: 10 cSt, viscosity_2: 2.6 cSt, temperature: {temperature}"
+    text = BENCH.replace(OIL, f"fluid: {{type: mineral_oil, {oil}}}")
+    refused.write({"c.yaml": text.replace("200 ms", "1 ms")})
+    for command in (["check"], ["simulate", "-o", "none"]):
+        code, out, _ = refused.run(command[0], "c.yaml", "--json", *command[1:])
+        warnings = json.loads(out)["warnings"]
+        assert code == 0
+        assert (warnings == []) if said is None else any(re.match(said, warning) for warning in warnings), warnings
+
+
+def test_a_separator_that_starts_beyond_its_stops_is_refused_by_name(tmp_path):
+    """Its sides would have negative volumes."""
+    text = f"""\
+        crescentlab: 1
+        {OIL}
+        components:
+          pump: {{type: flow_source, flow: 1 L/min}}
+          piston: {{type: piston_separator, volume: 1 L, start: {{V_a: START}}}}
+          hole: {{type: orifice, area: 5 mm^2}}
+          tank: {{type: tank}}
+        nets: {{p: [pump.port, piston.a], q: [piston.b, hole.a], t: [hole.b, tank.port]}}
+        simulation: {{stop: 10 ms}}
+        """
+    for solver in ("lsoda", "rodas"):
+        for start in ("-2 L", "1.1 L"):
+            with pytest.raises(SimulationError, match="piston: a side has used up its dead volume"):
+                circuit(tmp_path, text.replace("START", start)).simulate(solver=solver)
+        assert circuit(tmp_path, text.replace("START", "0.5 L")).simulate(solver=solver).trajectory.complete
 
 
 def test_steady_refuses_what_is_driven_below_absolute_zero(tmp_path):

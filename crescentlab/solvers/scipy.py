@@ -6,6 +6,7 @@ detail lives in :class:`Lsoda` and nowhere else.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from typing import Any
 
@@ -36,6 +37,13 @@ MULTISTEP_SHARE = 0.2
 """Share of the tolerance that LSODA, BDF and CVODE work to: at equal rtol their errors add up to some 20 times those of
 the Runge-Kutta methods (benchmarks/pump.py)."""
 
+MOST_STIFF = {"rk45": 2.2, "dop853": 4.0}
+"""Largest h |lambda| of the explicit methods. Up to 3.3 and 6.1 they are stable, but there what is fast is damped no more:
+its error stays, at some ten tolerances, and what is slow adds it up; DOP853's interpolant shows it twentyfold between the
+steps. At these limits a step shrinks it to a fifth or less, and between steps a tenth of it is seen."""
+UNMOVED = 1e-6
+"""Share of the tolerance: states that differ by less say nothing about f."""
+
 METHODS: dict[str, Any] = {
     "bdf": integrate.BDF, "radau": integrate.Radau, "rk45": integrate.RK45, "dop853": integrate.DOP853,
     "lsoda": integrate.LSODA,
@@ -60,6 +68,8 @@ class Stepper:
         self.options: dict[str, Any] = {}
         self.rhs: Callable[[float, np.ndarray], np.ndarray] = functions.rhs
         self.step_size: float | None = None
+        self.fastest = 0.0
+        """|lambda| [1/s] of what is fastest, as the last step of an explicit method saw it."""
         if name in ("bdf", "radau", "lsoda") and functions.n:
             self.options["jac"] = {"sparse": self.sparse, "dense": self.dense, "banded": self.banded}[layout]
         if layout != "sparse" and functions.n:
@@ -136,6 +146,26 @@ class Stepper:
         # a step cut short by the bound says nothing about the step the error would allow
         if solver.t < bound or self.step_size is None or solver.t - before > self.step_size:
             self.step_size = solver.t - before
+        if self.name in MOST_STIFF:
+            self.stay_stable()
+
+    def stay_stable(self) -> None:
+        """Keep the next step of an explicit method well inside its region of stability.
+
+        |lambda| of what is fastest among what the step disturbs is |f(x_1) - f(x_0)|/|x_1 - x_0|, in shares of the
+        tolerance, with x_1 the end of the step and x_0 what the last stage takes it for (Hairer & Wanner, Solving
+        Ordinary Differential Equations II, 1996, section IV.2); of two steps the smaller one, as the phase of an
+        oscillation can make one much larger than its frequency.
+        """
+        solver, last = self.solver, self.solver.n_stages - 1
+        stage = solver.y_old + solver.h_previous * (solver.K[:last].T @ solver.A[last, :last])
+        scale = self.atol + self.rtol * np.abs(solver.y)
+        moved, changed = (solver.y - stage) / scale, (solver.K[last + 1] - solver.K[last]) / scale
+        size = float(np.linalg.norm(moved))
+        rate = float(np.linalg.norm(changed)) / size if size > UNMOVED * math.sqrt(moved.size) else 0.0
+        if stiff := min(rate, self.fastest):
+            solver.h_abs = min(solver.h_abs, MOST_STIFF[self.name] / stiff)
+        self.fastest = rate
 
     def refresh(self, rate: np.ndarray) -> None:
         """Take f at the end of the last step anew, after a change too small for a restart."""

@@ -144,6 +144,8 @@ typedef struct Run {
     double *coef; /* (degree + 1, n) */
     double *stages; /* (stages, n) */
     double *work; /* (n) */
+    double rate_of_fastest; /* explicit methods: |lambda| of what is fastest in the candidate ... */
+    double rate_of_fastest_last; /* ... and in the step before */
 
     /* static sparse LU of I/(gamma h) - df/dx, rows in elimination order (lu.c) */
     int64_t *row; /* (n + 1) first entry of each row */
