@@ -112,6 +112,7 @@ def elaborate(netlist: Netlist, library: Library, settings: Settings | None = No
     work.scope(netlist, library, "", {}, overrides, (netlist.folder / netlist.name,))
     overrides.check_used()
     warnings = [said for each in (netlist, *work.parts.values()) for said in unused_parameters(each)]
+    warnings += [f"{name}: {said}" for name, fluid in fluids.items() for said in fluid.remarks()]
     return Design(netlist, work.instances, work.joined_nets(), fluids, work.outputs, work.parameters, tuple(warnings))
 
 

@@ -43,6 +43,10 @@ class Fluid(BaseModel):
         default=HIGHEST_PRESSURE, gt=0, description="gauge pressure up to which its law is meant; beyond, a run warns"
     )
 
+    def remarks(self) -> list[str]:
+        """Sentences on numbers for which its laws are not meant; `check` and runs warn of them."""
+        return []
+
     def density(self, p: Expr) -> Expr:
         """rho(p) [kg/m^3]."""
         raise NotImplementedError

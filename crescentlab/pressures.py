@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
@@ -9,6 +10,7 @@ import casadi as ca
 
 from crescentlab import units
 from crescentlab.causality import Plan
+from crescentlab.component import field_quantity, snake_case
 from crescentlab.domain import HYDRAULIC, Observable
 from crescentlab.energy import fluid_argument, fluids_asked
 from crescentlab.fluid import P_ATM
@@ -18,6 +20,8 @@ from crescentlab.units import Quantity
 
 ROUNDING = 1e-9
 """Share of the atmospheric pressure by which a pressure may lie below absolute zero."""
+SETTING = re.compile(r"(^|_)(pressure|preload)$")
+"""Names of parameters that set a pressure, unlike drops, ranges and moduli."""
 CAVITATES = (
     "the oil would cavitate: feed this part better, take a model that shows cavities (a capacity, or for a line a "
     "distributed_line, in a fluid that evaporates), or write tension: true in the fluid to go on"
@@ -119,3 +123,25 @@ def fluid_number(plan: Plan, p: ca.SX, fluid: str | None, name: str) -> ca.SX:
 def absolute_zeros(plan: Plan, p: ca.SX, fluids: Iterable[str | None]) -> ca.SX:
     """Gauge pressures below which there is nothing, one for each of the fluids, with room for rounding."""
     return -(1 + ROUNDING) * column([fluid_number(plan, p, fluid, "atmospheric_pressure") for fluid in fluids])
+
+
+def settings_too_high(plan: Plan) -> list[str]:
+    """Settings of parts above the pressure up to which the law of a fluid in them is meant, in words."""
+    warnings = []
+    for name, component in plan.components.items():
+        fluids = [plan.design.fluids[fluid] for fluid in plan.fluids[name].values()]
+        if not fluids:
+            continue
+        law = max(fluids, key=lambda fluid: fluid.highest_pressure)
+        for field, info in type(component).model_fields.items():
+            value = getattr(component, field)
+            if value is None or field_quantity(info) is not units.pressure or not SETTING.search(field):
+                continue
+            if value > law.highest_pressure:
+                kind = snake_case(type(law).__name__)
+                set_to, highest = (units.pressure.show(p, "bar") for p in (value, law.highest_pressure))
+                warnings.append(
+                    f"{name}.{field} is {set_to}, above {highest}, up to which the "
+                    f"law of {kind} is meant; lower it, or write highest_pressure in the fluid if its law holds there"
+                )
+    return warnings

@@ -14,6 +14,7 @@ from crescentlab.circuit import load
 from crescentlab.commands import arguments as shared
 from crescentlab.commands.text import counted, settings, table, wrapped
 from crescentlab.graph import Member, Net
+from crescentlab.pressures import settings_too_high
 from crescentlab.units import gauge_of
 from crescentlab.yaml_text import Node
 
@@ -63,7 +64,7 @@ def facts(plan: Plan) -> dict[str, Any]:
             for name, component in plan.components.items()
             for said in component.remarks(netlist.sections.simulation.stop)
         ] + [f"{said}: pressures are gauge, above 1.01325 bar absolute" for said in _absolute(netlist.node)],
-        "warnings": list(plan.design.warnings),
+        "warnings": [*plan.design.warnings, *settings_too_high(plan)],
         "forms": {name: type(c).type_name() for name, c in plan.components.items() if name in flexible},
     }  # fmt: skip
 

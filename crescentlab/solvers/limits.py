@@ -134,28 +134,21 @@ class PressureLimits:
 
     def too_high(self, rows: Rows, kinds: list[tuple[Range, Array]]) -> list[str]:
         """For each fluid the first pressure that its law is not meant for, and a flow there without a way out."""
-        first: dict[str | None, tuple[int, Range, Array, int]] = {}
-        count: dict[str | None, int] = {}
+        passing: dict[str | None, list[tuple[float, Range, Array, int]]] = {}
         for of, values in kinds:
-            above = values > of.highest
-            for k in np.flatnonzero(above.any(axis=0)).tolist():
-                row, fluid = int(np.argmax(above[:, k])), of.fluids[k]
-                count[fluid] = count.get(fluid, 0) + 1
-                if fluid not in first or row < first[fluid][0]:
-                    first[fluid] = row, of, values, k
+            for k in np.flatnonzero((values > of.highest).any(axis=0)).tolist():
+                time = crossing(rows.t, values[:, k], float(of.highest[k]))
+                passing.setdefault(of.fluids[k], []).append((time, of, values[:, k], k))
         warnings = []
-        for fluid, (row, of, values, k) in first.items():
-            p, limit = values[:, k], float(of.highest[k])
-            peak = int(np.nanargmax(p))
-            more = f" ({count[fluid] - 1} more pressures follow)" if count[fluid] > 1 else ""
-            t, high = float(rows.t[row]), units.pressure.show(float(p[peak]), "bar")
-            if row and rows.t[row - 1] < t:
-                t -= (t - rows.t[row - 1]) * (p[row] - limit) / (p[row] - p[row - 1])
-            worlds = [(float(rows.t[k]), rows.x[k], rows.h[k], rows.b[k]) for k in (row, peak)]
-            out = self.way_out(*worlds[0]) or self.way_out(*worlds[1])
+        for fluid, found in passing.items():
+            t, of, p, k = min(found, key=lambda each: each[0])
+            limit, peak = float(of.highest[k]), int(np.nanargmax(p))
+            worlds = [(float(rows.t[j]), rows.x[j], rows.h[j], rows.b[j]) for j in (int(np.argmax(p > limit)), peak)]
+            out = self.way_out(*worlds[0]) or self.way_out(*worlds[1]) or "what the fluid does there is extrapolated"
+            more = f" ({len(found) - 1} more follow)" if len(found) > 1 else ""
             warnings.append(
-                f"{of.names[k]} passes {self.meant(fluid, limit)}, at {t:.6g} s and reaches {high}{more}; "
-                f"{out or 'what the fluid does there is extrapolated'}"
+                f"{of.names[k]} passes {self.meant(fluid, limit)}, at {t:.6g} s and reaches "
+                f"{units.pressure.show(float(p[peak]), 'bar')}{more}; {out}"
             )
         return warnings
 
@@ -195,3 +188,11 @@ def under_tension(name: str, p: float, t: float, floor: float) -> str:
         f"{name} is {units.pressure.show(p, 'bar')} gauge at {t:.6g} s, below absolute zero "
         f"({units.pressure.show(floor, 'bar')})"
     )
+
+
+def crossing(t: Array, p: Array, limit: float) -> float:
+    """When a series first passes a limit, on a line between two rows."""
+    row = int(np.argmax(p > limit))
+    if row == 0 or not t[row - 1] < t[row]:
+        return float(t[row])
+    return float(t[row] - (t[row] - t[row - 1]) * (p[row] - limit) / (p[row] - p[row - 1]))
