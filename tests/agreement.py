@@ -96,7 +96,9 @@ class Reference:
         self.instants = happened(self.tight)
         stops = np.sort(np.array([s for times in self.instants.values() for s in times] + [self.start]))
         k = np.searchsorted(stops, grid)
-        near = np.minimum(np.abs(grid - stops[np.maximum(k - 1, 0)]), np.abs(stops[np.minimum(k, stops.size - 1)] - grid))
+        near = np.minimum(
+            np.abs(grid - stops[np.maximum(k - 1, 0)]), np.abs(stops[np.minimum(k, stops.size - 1)] - grid)
+        )
         self.times = grid[near > WINDOW * self.span]
         self.x, self.h = at(self.tight, self.times)
         self.names = [*system.state_names, *system.held_names]

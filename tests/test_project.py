@@ -28,7 +28,7 @@ LAYERS: tuple[tuple[str, ...], ...] = (
     ("assembly", "closed_sets"),
     ("solvers",),
     ("balance",),
-    ("result", "recorded", "placement", "plotting", "schematic"),
+    ("result", "recorded", "placement", "plotting", "schematic", "verification"),
     ("circuit",),
     ("analysis",),
     ("studies", "report"),
