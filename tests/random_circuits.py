@@ -22,7 +22,7 @@ from pydantic import ValidationError
 
 from crescentlab import units
 from crescentlab.component import Component, field_quantity
-from crescentlab.domain import CHAMBER, HYDRAULIC, ROTATIONAL, SIGNAL, TRANSLATIONAL, Port, State
+from crescentlab.domain import CHAMBER, SIGNAL, Port, State
 from crescentlab.library import installed
 from crescentlab.units import QUANTITIES, Quantity
 
