@@ -35,6 +35,7 @@ from crescentlab.solvers.snapshot import Snapshot
 from crescentlab.system import System
 from crescentlab.trace import structure_of
 from crescentlab.units import QUANTITIES
+from crescentlab.verification import TIGHTER, verification
 
 Start = Result | Snapshot | str | Path
 """What a run can go on from: another run, where it stood, or its file."""
@@ -177,12 +178,14 @@ class Circuit:
         self, stop: str | float | None = None, parameters: Settings | None = None, *,
         solver: str | None = None, rtol: float | None = None, output_step: str | float | None = None,
         max_step: str | float | None = None, compile: bool | None = None, start: Start | None = None,
-        progress: Callable[[float], None] | None = None, check: bool = True,
+        progress: Callable[[float], None] | None = None, check: bool = True, verify: bool = False,
     ) -> Result:  # fmt: skip
         """Integrate the circuit; text needs units, floats are SI. ``compile`` as for ``--compile``.
 
         With ``start``, a result or its file, the run goes on from its end, to the time ``stop``; with
-        ``start="steady"`` it begins at the operating point, as with ``simulation: {start: steady}``.
+        ``start="steady"`` it begins at the operating point, as with ``simulation: {start: steady}``. With ``verify`` it
+        is run again at a tenth of its tolerance, with steps at most half as long as the first run's longest may be, and
+        ``result.verification`` tells how far the two are apart; where they do not agree, a warning says so.
 
         Raises :class:`InputError` for wrong input, and, with ``check``, :class:`SimulationError` if the run
         fails, its ``result`` attribute holding what was computed.
@@ -216,6 +219,12 @@ class Circuit:
         result = Result(system, values if begin is None else begin.values(values), design, trajectory)
         if trajectory.status == "failed" and begin is None:
             trajectory.error += cold_start.advice(result, options.span)
+        if verify:
+            tighter = max(TIGHTER * options.rtol, SMALLEST_RTOL)
+            half = replace(options, rtol=tighter, max_step=options.step_cap / 2)  # else capped steps would be the same
+            again = integrate(system, values, half, progress, begin)
+            other = Result(system, result.values, design, again)
+            result.verification = verification(result, other, options.rtol, tighter)
         if check and trajectory.status == "failed":
             failure = SimulationError(trajectory.error)
             failure.result = result  # type: ignore[attr-defined]

@@ -31,6 +31,7 @@ if TYPE_CHECKING:
     from crescentlab.elaborate import Design
     from crescentlab.solvers.trajectory import Trajectory
     from crescentlab.system import System, Values
+    from crescentlab.verification import Verification
 
 
 EVENTS = ("after", "both")
@@ -50,6 +51,8 @@ class Result:
         self.title = design.netlist.sections.title or design.netlist.name
         self._rows = trajectory.shown.arrays()
         self._series: dict[str, np.ndarray] = {}
+        self.verification: Verification | None = None
+        """How far a run at a tenth of the tolerance is from this one, if that was asked for."""
 
     @property
     def time(self) -> np.ndarray:
@@ -70,7 +73,8 @@ class Result:
     def warnings(self) -> list[str]:
         """What the circuit's text, the run and its ledgers warn of."""
         own = self.balance.warnings if self.balance else []
-        return [*self.design.warnings, *self.trajectory.warnings, *own]
+        apart = self.verification.warnings if self.verification else []
+        return [*self.design.warnings, *self.trajectory.warnings, *own, *apart]
 
     @property
     def end(self) -> str | None:

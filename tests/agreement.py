@@ -9,7 +9,6 @@ time counts as the whole jump; times of events are compared by themselves.
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -96,11 +95,14 @@ class Reference:
         self.instants = happened(self.tight)
         stops = np.sort(np.array([s for times in self.instants.values() for s in times] + [self.start]))
         k = np.searchsorted(stops, grid)
-        near = np.minimum(np.abs(grid - stops[np.maximum(k - 1, 0)]), np.abs(stops[np.minimum(k, stops.size - 1)] - grid))
+        near = np.minimum(
+            np.abs(grid - stops[np.maximum(k - 1, 0)]), np.abs(stops[np.minimum(k, stops.size - 1)] - grid)
+        )
         self.times = grid[near > WINDOW * self.span]
         self.x, self.h = at(self.tight, self.times)
         self.names = [*system.state_names, *system.held_names]
-        nominal = np.concatenate([system.nominal, np.full(len(system.held_names), 1e-12)])
+        held = [system.find(name.partition("[")[0]).quantity.nominal for name in system.held_names]
+        nominal = np.concatenate([system.nominal, held])
         values = np.hstack([self.x, self.h])
         self.scale = nominal + np.abs(values).max(axis=0, initial=0.0)
         difference = self.compare(loose, 1.0)

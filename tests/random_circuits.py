@@ -22,7 +22,7 @@ from pydantic import ValidationError
 
 from crescentlab import units
 from crescentlab.component import Component, field_quantity
-from crescentlab.domain import CHAMBER, HYDRAULIC, ROTATIONAL, SIGNAL, TRANSLATIONAL, Port, State
+from crescentlab.domain import CHAMBER, SIGNAL, Port, State
 from crescentlab.library import installed
 from crescentlab.units import QUANTITIES, Quantity
 
@@ -192,7 +192,10 @@ class Growing:
                 values[name] = text(quantity, draw.uniform(*(where or RANGES[quantity.name])))
             elif name == "deflection":
                 wide = draw.uniform(1e-5, 5e-5)
-                values[name] = {"x": ["0 bar", "20 bar", "80 bar"], "y": ["0 mm", *(text(units.length, k * wide) for k in (1, 2))]}
+                values[name] = {
+                    "x": ["0 bar", "20 bar", "80 bar"],
+                    "y": ["0 mm", *(text(units.length, k * wide) for k in (1, 2))],
+                }
         return values
 
     def starts(self, cls: type[Component]) -> dict[str, str]:
@@ -227,11 +230,19 @@ class Growing:
         """A new net and something that gives it."""
         draw = self.random
         if domain == "hydraulic":
-            kind = draw.choices(["capacity", "elastic_capacity", "pressure_source", "tank", "gas_accumulator"], [6, 1, 1, 1, 1])[0]
-            fixed = {"pressure": text(units.pressure, self.base * draw.uniform(0.6, 1.2))} if kind in ("pressure_source", "tank") else {}
+            kind = draw.choices(
+                ["capacity", "elastic_capacity", "pressure_source", "tank", "gas_accumulator"], [6, 1, 1, 1, 1]
+            )[0]
+            fixed = (
+                {"pressure": text(units.pressure, self.base * draw.uniform(0.6, 1.2))}
+                if kind in ("pressure_source", "tank")
+                else {}
+            )
             return self.join(self.add(kind, fixed), fluid)
         if domain == "translational":
-            kind = draw.choices(["mass", "mass_with_stops", "stick_slip_mass", "stick_slip_mass_with_stops"], [5, 1, 1, 1])[0]
+            kind = draw.choices(
+                ["mass", "mass_with_stops", "stick_slip_mass", "stick_slip_mass_with_stops"], [5, 1, 1, 1]
+            )[0]
             net = self.join(self.add(kind), fluid)
             for other, share in (("spring", 0.7), ("damper", 0.7)):
                 if draw.random() < share:
@@ -247,7 +258,11 @@ class Growing:
         cls = type(part)
         mine: list[Net] = []
         given: list[Net] = []
-        fluids = {"a": fluid, "b": "other" if draw.random() < 0.5 else fluid} if cls.type_name() == "piston_separator" else {}
+        fluids = (
+            {"a": fluid, "b": "other" if draw.random() < 0.5 else fluid}
+            if cls.type_name() == "piston_separator"
+            else {}
+        )
         forms = cls.ports()
         for port in forms:
             size = size_of(part, port)
@@ -306,7 +321,12 @@ class Growing:
             known = self.given("hydraulic", fluid)
             (self.random.choice(known) if known else self.source("hydraulic", fluid)).ports.append(f"{plate}.{port}")
         if barrel.startswith("variable"):
-            self.join_signal(first, self.parsed[first], next(p for p in type(self.parsed[first]).ports() if p.name == "setting"), None)
+            self.join_signal(
+                first,
+                self.parsed[first],
+                next(p for p in type(self.parsed[first]).ports() if p.name == "setting"),
+                None,
+            )
 
     # -- signals -----------------------------------------------------------------------------------
 
@@ -346,9 +366,20 @@ class Growing:
             fixed |= {"mean": text(of, (a + b) / 2), "amplitude": text(of, (b - a) / 2)}
         elif kind == "pulse":
             width = draw.uniform(1e-3, 4e-3)
-            fixed |= {"low": one, "high": other, "at": at, "width": text(units.time, width), "period": text(units.time, width * draw.uniform(1.3, 3))}
+            fixed |= {
+                "low": one,
+                "high": other,
+                "at": at,
+                "width": text(units.time, width),
+                "period": text(units.time, width * draw.uniform(1.3, 3)),
+            }
         elif kind == "noise":
-            fixed |= {"mean": text(of, (a + b) / 2), "standard_deviation": text(of, (b - a) / 6), "distribution": "uniform", "seed": str(draw.randint(1, 99))}
+            fixed |= {
+                "mean": text(of, (a + b) / 2),
+                "standard_deviation": text(of, (b - a) / 6),
+                "distribution": "uniform",
+                "seed": str(draw.randint(1, 99)),
+            }
         else:
             times = sorted(draw.uniform(0.0, 20e-3) for _ in range(4))
             values = [text(of, draw.uniform(a, b)) for _ in times]
@@ -360,13 +391,37 @@ class Growing:
         draw, of = self.random, QUANTITIES[quantity]
         low, high = SIGNALS.get(quantity, (0.0, 1.0))
         size = max(abs(low), abs(high))
-        sensed = draw.choice(["pressure", "pressure", "speed", "length", "velocity", "flow", "angle", "force", "torque", "volume", "power"])
+        sensed = draw.choice(
+            [
+                "pressure",
+                "pressure",
+                "speed",
+                "length",
+                "velocity",
+                "flow",
+                "angle",
+                "force",
+                "torque",
+                "volume",
+                "power",
+            ]
+        )
         input_low, input_high = SIGNALS[sensed]
         middle, wide = (input_low + input_high) / 2, input_high - input_low
         there = QUANTITIES[sensed]
         fixed: dict[str, Any] = {"output_quantity": quantity}
         inputs = {"u": quantity}
-        if kind in ("gain", "integrator", "first_order_lag", "second_order_lag", "transfer_function", "relay", "table", "pid", "sampled_pid"):
+        if kind in (
+            "gain",
+            "integrator",
+            "first_order_lag",
+            "second_order_lag",
+            "transfer_function",
+            "relay",
+            "table",
+            "pid",
+            "sampled_pid",
+        ):
             inputs = {"u": sensed}
             fixed["input_quantity"] = sensed
             gain = {"per": text(there, wide)}
@@ -374,11 +429,19 @@ class Growing:
                 fixed |= {"upper": text(there, middle + 0.1 * wide), "lower": text(there, middle - 0.1 * wide)}
                 fixed |= {"on_value": text(of, high), "off_value": text(of, low)}
             elif kind == "table":
-                fixed = {"curve": {"x": [text(there, input_low + k * wide / 3) for k in range(4)],
-                                   "y": [text(of, draw.uniform(low, high)) for _ in range(4)]}}
+                fixed = {
+                    "curve": {
+                        "x": [text(there, input_low + k * wide / 3) for k in range(4)],
+                        "y": [text(of, draw.uniform(low, high)) for _ in range(4)],
+                    }
+                }
             elif kind in ("pid", "sampled_pid"):
                 inputs = {"setpoint": sensed, "measured": sensed}
-                fixed |= gain | {"gain": text(of, draw.uniform(0.2, 1.0) * size), "low": text(of, low), "high": text(of, high)}
+                fixed |= gain | {
+                    "gain": text(of, draw.uniform(0.2, 1.0) * size),
+                    "low": text(of, low),
+                    "high": text(of, high),
+                }
                 fixed["integral_time"] = text(units.time, draw.uniform(5e-3, 50e-3))
                 if draw.random() < 0.3:
                     fixed["derivative_time"] = text(units.time, draw.uniform(0.5e-3, 2e-3))
@@ -427,7 +490,12 @@ class Growing:
                 return self.signal(quantity, depth)
             inputs, fixed = {"power": "power"}, {}
         name = self.add(kind, fixed)
-        output = {"spool_drive": "stroke", "pid": "output", "sampled_pid": "output", "spring_chamber_pressure": "pressure"}
+        output = {
+            "spool_drive": "stroke",
+            "pid": "output",
+            "sampled_pid": "output",
+            "spring_chamber_pressure": "pressure",
+        }
         net = Net("signal", [f"{name}.{output.get(kind, 'y')}"])
         self.nets.append(net)
         for port, of_input in inputs.items():
@@ -441,7 +509,6 @@ class Growing:
         if not kind:
             return
         name = self.add(kind)
-        part = self.parsed[name]
         net.ports.append(f"{name}.{port}")
         self.join(name, "oil", but=port)
 

@@ -30,7 +30,7 @@ LAYERS: tuple[tuple[str, ...], ...] = (
     ("assembly", "closed_sets"),
     ("solvers",),
     ("balance",),
-    ("result", "recorded", "placement", "plotting", "schematic"),
+    ("result", "recorded", "placement", "plotting", "schematic", "verification"),
     ("cold_start",),
     ("circuit",),
     ("analysis",),

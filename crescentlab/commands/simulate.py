@@ -23,6 +23,7 @@ from crescentlab.commands.text import counted, settings, table
 from crescentlab.result import Result, check_record
 from crescentlab.series_files import result_target
 from crescentlab.units import QUANTITIES
+from crescentlab.verification import Verification
 
 log = logging.getLogger("crescentlab")
 
@@ -46,6 +47,9 @@ def arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--record", action="append", default=[], metavar="GLOB", help="variables to write; only * and ? are wild"
     )
+    parser.add_argument(
+        "--verify", action="store_true", help="run again at a tenth of the tolerance, and say how far the two are apart"
+    )
     parser.add_argument("--plot", action="store_true", help="write the circuit's plots as PNG files beside the result")
     shared.json(parser)
     shared.quiet(parser)
@@ -61,6 +65,7 @@ def run(options: argparse.Namespace) -> int:
         result = circuit.simulate(
             options.stop, values, solver=options.solver, rtol=options.rtol, output_step=options.output_step,
             compile=options.compile, start=options.start, progress=progress, check=False,
+            verify=options.verify,
         )  # fmt: skip
     status = result.trajectory.status
     log.info("integrated in %.3f s: %s", result.trajectory.statistics.wall_s, status)
@@ -119,6 +124,7 @@ def report(result: Result, target: Path | None) -> dict[str, Any]:
         "evaluations": s.evaluations, "jacobians": s.jacobians, "events": s.events, "ticks": s.ticks,
         "restarts": s.restarts, "states": len(result.system.state_names),
         "balance": balance.as_json() if balance else None, "warnings": result.warnings,
+        "verify": result.verification.as_json() if result.verification else None,
         "file": str(target) if target else None, "error": t.error or None,
     }  # fmt: skip
 
@@ -139,12 +145,27 @@ def summary(result: Result, target: Path | None, record: list[str], pictures: li
         more = len(result.net_pressures()) - MAX_NETS
         said = f"\n  and {counted(more, 'net')} more" if more > 0 else ""
         parts.append(table(rows, right=(2, 3, 4, 5), indent="  ") + said)
+    if result.verification:
+        parts.append(verified(result.verification))
     parts += [f"  warning: {warning}" for warning in result.warnings]
     written = [f"  wrote {path}" for path in pictures]
     if target is not None:
         names = counted(len(result.chosen(record)), "variable")
         written.insert(0, f"  wrote {target}: {counted(result.time.size, 'row')}, {names}")
     return "\n\n".join([*parts, "\n".join(written)] if written else parts)
+
+
+def verified(found: Verification) -> str:
+    """The error estimate of each output, the largest first."""
+    rows: list[tuple[str, ...]] = [("error estimate", "largest", "share of range", "at")]
+    for output in found.outputs[:MAX_NETS]:
+        when = QUANTITIES["time"].show(output.time, "ms")
+        rows.append((output.name, found.amount(output), f"{output.share:.1e}", when))
+    more = len(found.outputs) - MAX_NETS
+    said = f"\n  and {counted(more, 'output')} more, all nearer" if more > 0 else ""
+    agrees = "they agree" if found.agrees else "they do NOT agree"
+    head = f"  verified at rtol {found.tighter:g} against {found.rtol:g}: {agrees}"
+    return f"{head}\n{table(rows, right=(1, 2, 3), indent='  ')}{said}"
 
 
 def _facts(result: Result) -> list[tuple[str, str]]:

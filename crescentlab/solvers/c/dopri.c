@@ -70,8 +70,9 @@ static double attempt(Run *r, double h)
     memset(r->work, 0, n * sizeof *k);
     combine(n, r->work, r->work, h, k, e, STAGES);
     /* the smaller of two steps: the phase of an oscillation can make one much larger than its frequency */
-    const double stiff = h * fmin(r->rate_of_fastest, r->rate_of_fastest_last) / MOST_STIFF;
-    return fmax(error_norm(r, r->work), pow(stiff, dopri.order));
+    const double stiff = pow(h * fmin(r->rate_of_fastest, r->rate_of_fastest_last) / MOST_STIFF, dopri.order);
+    const double error = error_norm(r, r->work);
+    return stiff > error ? stiff : error; /* what is no number stays one */
 }
 
 static void finish(Run *r, double h)
