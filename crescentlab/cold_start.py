@@ -15,7 +15,7 @@ EQUAL = 1e3
 
 
 def advice(result: Result, span: float) -> str:
-    """A sentence for a run of ``span`` [s] from start values that failed at its beginning in a hydraulic part; otherwise nothing.
+    """A sentence for a run of ``span`` [s] that failed in its beginning in a hydraulic part; otherwise nothing.
 
     Compared are the pressures of volumes and lines, and those that sources give; a tank's 0 bar contradicts nothing.
     """

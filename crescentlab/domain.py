@@ -36,20 +36,20 @@ HYDRAULIC = Domain(
     "hydraulic",
     (("p", units.pressure),),
     (("q", units.flow),),
-    "a capacity, for example {type: capacity, volume: 10 cm^3}",
+    "a capacity, for example {type: capacity, volume: 10 cm^3}, its port on this net",
 )
 TRANSLATIONAL = Domain(
     "translational", (("x", units.length), ("v", units.velocity)), (("f", units.force),),
-    "a mass, for example {type: mass, mass: 20 g}",
+    "a mass, for example {type: mass, mass: 20 g}, its port on this net",
 )  # fmt: skip
 ROTATIONAL = Domain(
     "rotational", (("phi", units.angle), ("omega", units.speed)), (("torque", units.torque),),
-    "a shaft speed, for example {type: speed_source, speed: 2000 rpm}",
+    "a shaft speed, for example {type: speed_source, speed: 2000 rpm}, its shaft on this net",
 )  # fmt: skip
 CHAMBER = Domain(
     "chamber", (("V", units.volume), ("dV", units.flow)), (("p", units.pressure),), "a part that shapes a volume"
 )
-SIGNAL = Domain("signal", (("", units.ratio),), (), "a source of the signal, for example {type: constant, value: 1}")
+SIGNAL = Domain("signal", (("", units.ratio),), (), "a source of the signal")
 
 ENERGY_ENTRIES: tuple[Entry, ...] = ("energy", "dissipation", "supply")
 """The entries of the ledger of energy."""

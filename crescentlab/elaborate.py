@@ -20,10 +20,10 @@ from crescentlab.component import Component, field_quantity, is_structural
 from crescentlab.domain import HYDRAULIC, Held, Observable, Port, Scheduled, State
 from crescentlab.errors import ComponentError, ExpressionError, InputError, Place, UnitError, nearest
 from crescentlab.explain import validated
-from crescentlab.expressions import Value, evaluate, is_expression, number_of
+from crescentlab.expressions import Value, evaluate, is_expression, names_in, number_of
 from crescentlab.fluid import Fluid
 from crescentlab.library import Library
-from crescentlab.netlist import Netlist, NetSection, net_ports
+from crescentlab.netlist import FLUID, Netlist, NetSection, net_ports
 from crescentlab.units import QUANTITIES, Quantity, is_number, parse_any
 from crescentlab.unused import unused_parameters
 from crescentlab.yaml_text import Node
@@ -172,9 +172,7 @@ class _Elaboration:
             node = replace(netlist.node.find(path), place=netlist.place(*path))
             assert isinstance(node.value, dict)
             if "type" not in node.value:
-                raise InputError(
-                    "the fluid needs a type, for example fluid: {type: water, temperature: 20 degC}", node.place
-                )
+                raise InputError(f"the fluid needs a type, for example fluid: {FLUID}", node.place)
             cls = library.fluid(str(node.value["type"].value), node.place_of("type"))
             made[name] = self.instance(cls, node, _scope_lookup(values, netlist), overrides, name, netlist.folder)
         return made
@@ -493,7 +491,17 @@ def _parameter_values(
         return values[name]
 
     for name in texts:
-        find(name)
+        todo = [name]
+        while todo:  # what a long chain rests on comes first, so that its length does not matter
+            given = overrides.values.get(prefix + todo[-1], texts[todo[-1]])
+            asked = names_in(given) if isinstance(given, str) and is_expression(given) else set()
+            waiting = [each for each in sorted(asked) if each in texts and each not in values]
+            if not waiting or todo[-1] in values or todo[-1] in passed:
+                find(todo.pop())
+            elif waiting[0] not in todo:
+                todo.append(waiting[0])
+            else:  # a circle, which is told from its first name on
+                find(todo[0])
     return values
 
 

@@ -39,6 +39,8 @@ OutputName = Annotated[
 ]
 
 
+FLUID = "{type: simple_oil, density: 860 kg/m^3, kinematic_viscosity: 35 cSt, bulk_modulus: 14000 bar}"
+"""A fluid as messages write it."""
 SMALLEST_RTOL = 1e-13
 """Below this, rounding spoils what a solver compares."""
 
@@ -177,8 +179,7 @@ class Netlist:
 
 
 _KINDS: dict[str, tuple[type, str]] = {
-    "fluid": (dict, "{type: water, temperature: 20 degC}"),
-    "fluids": (dict, "{coolant: {type: water, temperature: 20 degC}}"),
+    "fluid": (dict, FLUID), "fluids": (dict, f"{{oil: {FLUID}}}"),
     "parameters": (dict, "{supply: 30 L/min}"), "components": (dict, "{tank: {type: tank}}"),
     "ports": (dict, "{inlet: p_line}"),
     "nets": (dict, "{p_line: [pump.port, line.port]}"), "outputs": (dict, "{loss: '= line.p * valve.q'}"),
@@ -202,7 +203,7 @@ def _collections(node: Node) -> None:
         if not isinstance(node.find(("nets", name)).value, dict):
             _shaped(node, ("nets", name), list, "[pump.port, line.port]")
     for name in _keys(node, "fluids"):
-        _shaped(node, ("fluids", name), dict, "{type: water, temperature: 20 degC}")
+        _shaped(node, ("fluids", name), dict, FLUID)
 
 
 def _keys(node: Node, section: str) -> list[str]:

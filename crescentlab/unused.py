@@ -1,4 +1,4 @@
-"""Parameters of a circuit file that nothing in it uses: mostly slips of the pen, so a run and ``check`` warn of them."""
+"""Parameters of a circuit file that nothing in it uses: mostly slips of the pen, of which runs and ``check`` warn."""
 
 from __future__ import annotations
 
@@ -11,6 +11,8 @@ from crescentlab.yaml_text import Node
 
 EVALUATED = ("outputs", "simulation")
 """Sections whose texts are expressions without a leading ``=`` as well."""
+MOST = 10
+"""Most parameters of a file that are told by name."""
 READ = ("components", "fluid", "fluids", "nets", *EVALUATED)
 """Sections that may use parameters; parameters may use each other."""
 
@@ -35,8 +37,11 @@ def unused_parameters(netlist: Netlist) -> list[str]:
         more = names_in(text) if is_expression(text) else set()
         todo += [each for each in more - used if each in texts]
         used |= more
-    known = [name for name in texts if name in used]
-    return [_warning(netlist, name, known) for name in texts if name not in used]
+    known, idle = [name for name in texts if name in used], [name for name in texts if name not in used]
+    warnings = [_warning(netlist, name, known) for name in idle[:MOST]]
+    if len(idle) > MOST:
+        warnings.append(f"{netlist.name}: nothing uses {len(idle) - MOST} more parameters")
+    return warnings
 
 
 def _warning(netlist: Netlist, name: str, used: list[str]) -> str:

@@ -170,7 +170,7 @@ NETS = {
     ),
     "empty fluid": (
         edited((OIL, f"fluid:{MARK}")),
-        "the fluid needs a type, for example fluid: {type: water, temperature: 20 degC}",
+        "the fluid needs a type, for example fluid: {type: simple_oil, density: 860 kg/m^3, kinematic_viscosity: ",
     ),
     "fluid and fluids": (
         edited((STOP, f"{STOP}\nfluids: {{oil: {{type: simple_oil}}}}{MARK}")),
