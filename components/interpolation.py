@@ -140,7 +140,11 @@ def on_piece(x: Any, piece: Any, column: int, degree: int) -> Any:
 
 
 def pieces(
-    x: Sequence[float] | np.ndarray, y: np.ndarray, course: Course, beyond: Beyond, reach: tuple[float, float] = (0.0, 0.0)
+    x: Sequence[float] | np.ndarray,
+    y: np.ndarray,
+    course: Course,
+    beyond: Beyond,
+    reach: tuple[float, float] = (0.0, 0.0),
 ) -> Pieces:
     """Pieces through points whose ``x`` (n,) do not fall; ``y`` (n,) or (n, columns).
 
