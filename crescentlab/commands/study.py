@@ -15,6 +15,7 @@ from crescentlab.commands import arguments as shared
 from crescentlab.commands.text import counted, table
 from crescentlab.studies import conduct, tables
 from crescentlab.studies.planning import Planned
+from crescentlab.studies.pool import LocalPool
 from crescentlab.studies.progress import Progress, duration
 from crescentlab.studies.run_study import any_good, finish, opened, runner
 from crescentlab.studies.store import Row, Store
@@ -43,7 +44,7 @@ def _count(text: str) -> int:
 
 def run(options: argparse.Namespace) -> int:
     """Run the command."""
-    run_on = runner(options.workers, options.scheduler)
+    run_on = runner(options.workers, options.scheduler, LocalPool)
     planned, store = opened(Path(options.study), options.output, no_code=options.no_code)
     if options.dry_run:
         return _dry_run(planned, store, options)

@@ -88,8 +88,10 @@ def opened(path: Path, folder: str | Path | None, *, no_code: bool = False) -> t
     return planned, Store(at)
 
 
-def runner(workers: int | None, scheduler: str | None) -> Callable[[int], Runner]:
-    """What makes the processes that run so many points."""
+def runner(
+    workers: int | None, scheduler: str | None, pool: Callable[[int], Runner] = LocalPool
+) -> Callable[[int], Runner]:
+    """What makes the processes that run so many points: a ``pool`` of this machine, or a cluster."""
     if workers and scheduler:
         raise InputError("--workers is for this machine, --scheduler for a cluster; give one of them")
 
@@ -98,7 +100,7 @@ def runner(workers: int | None, scheduler: str | None) -> Callable[[int], Runner
             from crescentlab.studies.dask_runner import DaskPool
 
             return DaskPool(scheduler)
-        return LocalPool(min(workers or cores(), jobs))
+        return pool(min(workers or cores(), jobs))
 
     return made
 
