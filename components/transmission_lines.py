@@ -308,7 +308,7 @@ class TransmissionLineTakesGives(TransmissionLine):
         losses = Losses(q_lump, drop, q_lag)
         shared = self.stepped(to_b, to_a, losses, books, q_a, at_b.q, t, fluid)
         shared |= self.with_cavity("b", at_b, cavity_b, open_b, fluid)
-        shared["content"] = shared["content"] - self.at_rest(fluid) * cavity_b
+        shared["content"] -= self.at_rest(fluid) * cavity_b
         return {"q_a": q_a, "p_b": at_b.p} | shared
 
 
@@ -338,7 +338,7 @@ class TransmissionLineGivesTakes(TransmissionLine):
         losses = Losses(q_lump, drop, q_lag)
         shared = self.stepped(to_b, to_a, losses, books, at_a.q, q_b, t, fluid)
         shared |= self.with_cavity("a", at_a, cavity_a, open_a, fluid)
-        shared["content"] = shared["content"] - self.at_rest(fluid) * cavity_a
+        shared["content"] -= self.at_rest(fluid) * cavity_a
         return {"p_a": at_a.p, "q_b": q_b} | shared
 
 
@@ -371,5 +371,5 @@ class TransmissionLineGivesGives(TransmissionLine):
         shared = self.stepped(to_b, to_a, losses, books, at_a.q, at_b.q, t, fluid)
         shared |= self.with_cavity("a", at_a, cavity_a, open_a, fluid)
         shared |= self.with_cavity("b", at_b, cavity_b, open_b, fluid)
-        shared["content"] = shared["content"] - self.at_rest(fluid) * (cavity_a + cavity_b)
+        shared["content"] -= self.at_rest(fluid) * (cavity_a + cavity_b)
         return {"p_a": at_a.p, "p_b": at_b.p} | shared

@@ -36,7 +36,7 @@ class CavityEnd:
 
 
 def least_pressure(fluid: Fluid) -> Any:
-    """P_c [Pa] gauge: vapour pressure; absolute zero without vapour, where the run ends; None for fluid under tension."""
+    """P_c [Pa] gauge: vapour pressure; absolute zero without vapour, where the run ends; None under tension."""
     if fluid.cavity_pressure is not None:
         return fluid.cavity_pressure
     return None if fluid.tension else -fluid.atmospheric_pressure
