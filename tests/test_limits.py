@@ -105,6 +105,36 @@ def test_a_driven_pressure_ends_the_run_where_it_passes_absolute_zero(tmp_path, 
     assert result["source.port.p"][0] > 0 or signal.startswith("{type: step")
 
 
+def test_a_start_below_absolute_zero_is_refused_with_its_line(refused: Refusal) -> None:
+    """Where it was written: a start value, a parameter that gives one, an option; a fluid under tension may."""
+    part = "{type: PART, volume: 1 L,\n         start: {p: -5 bar}}"
+    line = "{type: distributed_line, cells: 2, length: 2 m, diameter: 10 mm,\n         start_pressure: -5 bar}"
+    text = f"""\
+crescentlab: 1
+{OIL}
+components:
+  pump: {{type: flow_source, flow: 1 L/min}}
+  line: {part.replace("PART", "capacity")}
+nets: {{p: [pump.port, line.port]}}
+simulation: {{stop: 1 ms}}
+"""
+    said = "-5 bar gauge is below absolute zero"
+    refused.write({"c.yaml": text, "t.yaml": text.replace("bar}", "bar, tension: true}", 1)})
+    assert refused.told("simulate", "c.yaml").startswith(f"c.yaml:6: line.start.p: {said}")
+    set_to = refused.told("check", "c.yaml", "--set", "line.start.p=-2 bar")
+    assert set_to.startswith("--set line.start.p: -2 bar gauge is below absolute zero")
+    assert refused.run("check", "t.yaml")[0] == 0
+    refused.write(
+        {
+            "c.yaml": text.replace(part.replace("PART", "capacity"), line)
+            .replace("line.port", "line.a")
+            .replace("nets:", "  tank: {type: tank}\nnets:")
+            .replace("}\nsim", ", t: [line.b, tank.port]}\nsim")
+        }
+    )
+    assert refused.told("check", "c.yaml").startswith(f"c.yaml:6: line.start_pressure: {said}")
+
+
 @pytest.mark.parametrize("solver", ["lsoda", "rodas"])
 def test_a_given_pressure_under_tension_warns_once(tmp_path, solver):
     """As states do: from the first step below -101325 Pa on; the run goes on to its end."""
