@@ -45,7 +45,7 @@ class Instance:
     forms: tuple[type[Component], ...] = ()
     """Of a family, the causal forms that the library of its file has; of another class, itself."""
     places: dict[str, Place | None] = field(default_factory=dict)
-    """Where each of its parameters was written."""
+    """Where each of its parameters was written, and each start value, as ``start.p``."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -253,7 +253,9 @@ class _Elaboration:
                 start[name] = np.array([self.start_pressure])
         assert isinstance(node.value, dict)
         places = {name: child.place for name, child in node.value.items()}
-        places |= {name: COMMAND for name in cls.model_fields if f"{full}.{name}" in overrides.used}
+        places |= {f"start.{name}": child.place for name, child in given.items()}
+        written = [*cls.model_fields, *(f"start.{name}" for name in stateful)]
+        places |= {name: COMMAND for name in written if f"{full}.{name}" in overrides.used}
         self.instances[full] = Instance(full, instance, node.place, start, tuple(forms), places)
 
     def start_fields(self, cls: type[Component]) -> dict[str, float]:

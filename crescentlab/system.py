@@ -20,13 +20,13 @@ import numpy as np
 from crescentlab import units
 from crescentlab.causality import Plan
 from crescentlab.columns import Columns
-from crescentlab.component import Component
+from crescentlab.component import Component, field_quantity
 from crescentlab.domain import Held, Scheduled, State
 from crescentlab.elaborate import COMMAND, Design
 from crescentlab.energy import keeps_books, power_ports
 from crescentlab.errors import InputError, nearest
 from crescentlab.prepared import LARGE, Prepared, jacobian, prepare, shared
-from crescentlab.pressures import ASKED, GivenPressure, absolute_zeros
+from crescentlab.pressures import ASKED, GivenPressure, absolute_zeros, own_pressures
 from crescentlab.schedule import Following
 from crescentlab.symbols import column
 from crescentlab.trace import numeric_fields, structure_of
@@ -291,32 +291,54 @@ class System:
         return values
 
     def check_constants(self, values: Values, design: Design) -> None:
-        """Raise :class:`InputError` if a pressure that parameters alone give lies below absolute zero."""
-        constant = [
-            each for each in self.given if not each.moving and not (each.fluid and design.fluids[each.fluid].tension)
-        ]
-        if not constant:
-            return
+        """Raise :class:`InputError` if a start, or a pressure that parameters alone give, lies below absolute zero."""
+        fluids = self.plan.design.fluids
+        constant = [each for each in self.given if not each.moving]
+        starts = [
+            (names[k], fluid, start[k])
+            for names, quantities, start in (
+                (self.state_names, self.state_quantities, values.x0), (self.held_names, self.held_quantities, values.h0)
+            )
+            for k, fluid in own_pressures(self.plan, names, quantities)
+        ]  # fmt: skip
 
         def made() -> ca.Function:
-            pressures = column([each.expression for each in constant])
-            return ca.Function(
-                "constants", [self.p], [pressures, absolute_zeros(self.plan, self.p, [c.fluid for c in constant])]
-            )
+            lowest = absolute_zeros(self.plan, self.p, (*fluids, None))
+            return ca.Function("constants", [self.p], [column([each.expression for each in constant]), lowest])
 
-        found, lowest = (np.array(each).ravel() for each in self.once("constant pressures", made)(values.p))
-        for each, p, least in zip(constant, found, lowest, strict=True):
-            if p < least:
-                instance = design.instances[each.owner]
-                field = next((n for n in each.parameters if n in instance.places), None)
-                name = each.name if field is None else f"{each.owner}.{field}"
-                place = instance.place if field is None else instance.places[field]
-                if place is COMMAND:
-                    name, place = f"--set {name}", None
-                raise InputError(
-                    f"{name}: {units.pressure.show(p, 'bar')} gauge is below absolute zero "
-                    f"({units.pressure.show(least, 'bar')}); {ASKED}", place,
-                )  # fmt: skip
+        pressures, lowest = (np.array(each).ravel() for each in self.once("constant pressures", made)(values.p))
+        floors = dict(zip((*fluids, None), lowest.tolist(), strict=True))
+        floors |= {name: -np.inf for name, fluid in fluids.items() if fluid.tension}
+        for each, p in zip(constant, pressures.tolist(), strict=True):
+            if p < floors[each.fluid]:
+                raise self.impossible(design, each.owner, each.name, each.parameters, p, floors[each.fluid])
+        for full, fluid, p in starts:
+            if p < floors[fluid]:
+                owner, _, name = full.rpartition(".")
+                name = name.partition("[")[0]
+                fields = type(self.plan.components[owner]).model_fields
+                given = [
+                    n for n, info in fields.items() if n.startswith("start") and field_quantity(info) is units.pressure
+                ]
+                raise self.impossible(
+                    design, owner, f"{owner}.start.{name}", (f"start.{name}", *given), p, floors[fluid]
+                )
+
+    @staticmethod
+    def impossible(
+        design: Design, owner: str, name: str, fields: Sequence[str], p: float, floor: float
+    ) -> InputError:  # fmt: skip
+        """What is said of a pressure below absolute zero, where the first of the part's ``fields`` was written."""
+        instance = design.instances[owner]
+        field = next((n for n in fields if n in instance.places), None)
+        name = name if field is None else f"{owner}.{field}"
+        place = instance.place if field is None else instance.places[field]
+        if place is COMMAND:
+            name, place = f"--set {name}", None
+        show = units.pressure.show
+        return InputError(
+            f"{name}: {show(p, 'bar')} gauge is below absolute zero ({show(floor, 'bar')}); {ASKED}", place
+        )
 
 
 def _start(

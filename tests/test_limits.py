@@ -16,6 +16,7 @@ from refusing import Refusal
 import crescentlab as cl
 from crescentlab.commands.simulate import finite
 from crescentlab.errors import InputError, SimulationError
+from crescentlab.library import installed
 
 SOLVERS = ["auto", "lsoda", "bdf", "radau", "rk45", "dop853", "cvode", "rodas", "dopri"]
 OIL = "fluid: {type: simple_oil, density: 860 kg/m^3, kinematic_viscosity: 35 cSt, bulk_modulus: 14000 bar}"
@@ -103,6 +104,36 @@ def test_a_driven_pressure_ends_the_run_where_it_passes_absolute_zero(tmp_path, 
     assert result.time[-1] == pytest.approx(end, rel=1e-9)
     assert np.all(np.isfinite(result["line.p"]))
     assert result["source.port.p"][0] > 0 or signal.startswith("{type: step")
+
+
+def test_a_start_below_absolute_zero_is_refused_with_its_line(refused: Refusal) -> None:
+    """Where it was written: a start value, a parameter that gives one, an option; a fluid under tension may."""
+    part = "{type: PART, volume: 1 L,\n         start: {p: -5 bar}}"
+    line = "{type: distributed_line, cells: 2, length: 2 m, diameter: 10 mm,\n         start_pressure: -5 bar}"
+    text = f"""\
+crescentlab: 1
+{OIL}
+components:
+  pump: {{type: flow_source, flow: 1 L/min}}
+  line: {part.replace("PART", "capacity")}
+nets: {{p: [pump.port, line.port]}}
+simulation: {{stop: 1 ms}}
+"""
+    said = "-5 bar gauge is below absolute zero"
+    refused.write({"c.yaml": text, "t.yaml": text.replace("bar}", "bar, tension: true}", 1)})
+    assert refused.told("simulate", "c.yaml").startswith(f"c.yaml:6: line.start.p: {said}")
+    set_to = refused.told("check", "c.yaml", "--set", "line.start.p=-2 bar")
+    assert set_to.startswith("--set line.start.p: -2 bar gauge is below absolute zero")
+    assert refused.run("check", "t.yaml")[0] == 0
+    refused.write(
+        {
+            "c.yaml": text.replace(part.replace("PART", "capacity"), line)
+            .replace("line.port", "line.a")
+            .replace("nets:", "  tank: {type: tank}\nnets:")
+            .replace("}\nsim", ", t: [line.b, tank.port]}\nsim")
+        }
+    )
+    assert refused.told("check", "c.yaml").startswith(f"c.yaml:6: line.start_pressure: {said}")
 
 
 @pytest.mark.parametrize("solver", ["lsoda", "rodas"])
@@ -298,3 +329,24 @@ def test_steady_refuses_what_is_driven_below_absolute_zero(tmp_path):
     """The time stands still after the step to -5 bar."""
     with pytest.raises((SimulationError, InputError), match=r"source\.port\.p is -5 bar gauge, below absolute zero"):
         cl.steady(circuit(tmp_path, DRIVEN.replace("SIGNAL", SIGNALS["step"][0].replace("4 ms", "0 ms"))))
+
+
+def test_the_figures_of_the_page_on_fluids():
+    """Against Hayward's law, written out, a constant modulus of the same size at 0 bar, as docs/fluids.md prints it."""
+    oil = installed().fluids["mineral_oil"](grade="ISO VG 46", temperature=313.15, air_fraction=0.0)
+    stiff = float(oil.bulk_modulus(0.0))
+    for bar, low, high in ((300, 0.16, 0.001), (500, 0.24, 0.004), (1000, 0.41, 0.014)):
+        p, m = bar * 1e5, 5.6
+        modulus = (stiff + m * p) * (stiff + (m - 1) * p) / stiff
+        density = (stiff + m * p) / (stiff + (m - 1) * p)
+        assert oil.bulk_modulus(p) == pytest.approx(modulus, rel=1e-9)
+        assert 1 - stiff / modulus == pytest.approx(low, abs=0.005)
+        assert math.exp(p / stiff) / density - 1 == pytest.approx(high, abs=0.0005)
+
+
+def test_each_fluid_knows_its_range():
+    """The sources' ranges; the base class's own for a fluid that says nothing."""
+    highest = {name: cls.model_fields["highest_pressure"].default / 1e5 for name, cls in installed().fluids.items()}
+    assert highest == {
+        "simple_oil": 1000.0, "aerated_oil": 1000.0, "cavitating_oil": 1000.0, "mineral_oil": 800.0, "water": 1000.0
+    }  # fmt: skip
