@@ -20,8 +20,8 @@ ROUNDING = 1e-9
 """Share of the atmospheric pressure by which a pressure may lie below absolute zero."""
 CAVITATES = (
     "the oil would cavitate: feed this part better, take a model that shows cavities in a fluid that evaporates (a "
-    "capacity; of lines a distributed_line, or a transmission_line at its ends), or write tension: true in the fluid to "
-    "go on"
+    "capacity; of lines a distributed_line, or a transmission_line at its ends), or write tension: true in the fluid "
+    "to go on"
 )
 """What to do about a pressure below absolute zero."""
 ASKED = (

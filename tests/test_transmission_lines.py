@@ -307,11 +307,11 @@ def test_column_separation_at_a_closed_end(solver: str, swap: bool) -> None:
     stop, then P_c less 2.7 h, 0.7 h, -1.3 h, -3.3 h for 2 L/a each: w_(k+1) = 2 p_R - 2 p + w_k. The cavity grows with
     (P_c - w)/Z, is the largest, 3.4 h/Z 2 L/a, two such periods after it opened, and is gone 2.1/3.3 into the fourth.
     Then the end has P_c + 3.3 h, and from the next period on, for as long as the cavity was open in the last, P_c +
-    5.3 h: more than Joukowsky's 4.7 h. Tolerances: a front takes a tick, L/(80 a), as a straight line from 4.7 h to -2.7 h
-    about P_c, of whose upper part, up to 4.7^2/(2 7.4) = 1.5 h ticks, the cavity gets nothing; it comes back twice with
-    each echo. So the volume is short by up to 1.5 (1 + 2) ticks h/Z at its largest, and by 1.5 (1 + 3 2) before the
-    collapse, which makes it 3.2 ticks early. Friction of the smooth bore at 0.3 m/s, f rho v^2 L/(2 d) with f = 0.004,
-    is 0.08 kPa, 1e-3 of h. Wylie & Streeter (1993), section 8-2 and figure 8-4: the short pulse after the collapse.
+    5.3 h: more than Joukowsky's 4.7 h. Tolerances: a front takes a tick, L/(80 a), as a straight line from 4.7 h to
+    -2.7 h about P_c, of whose upper part, up to 4.7^2/(2 7.4) = 1.5 h ticks, the cavity gets nothing; it comes back
+    twice with each echo. So the volume is short by up to 1.5 (1 + 2) ticks h/Z at its largest, and by 1.5 (1 + 3 2)
+    before the collapse, which makes it 3.2 ticks early. Friction of the smooth bore at 0.3 m/s, f rho v^2 L/(2 d) with
+    f = 0.004, is 0.08 kPa, 1e-3 of h. Wylie & Streeter (1993), on column separation: the short pulse after the collapse.
     """
     h = 1.01325e5 - 2e3
     Z = 870 * WAVE / (math.pi / 4 * WIDE**2)
