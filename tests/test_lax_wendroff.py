@@ -376,8 +376,8 @@ def test_family() -> None:
 def test_a_node_inside_below_absolute_zero_ends_the_run() -> None:
     """Two waves of -0.7 bar from both ends of a line at 0 bar meet inside it, at L/(2 a): to -1.4 bar.
 
-    d'Alembert; the ends stay at -0.7 bar. Told with the lines that go on, before the Courant number is looked at; within
-    three ticks of 0.9/33 L/a, as the scheme spreads a front over some cells.
+    d'Alembert; the ends stay at -0.7 bar. Told with the lines that go on, before the Courant number is looked at;
+    within three ticks of 0.9/33 L/a, as the scheme spreads a front over some cells.
     """
     made = circuit(
         components={
@@ -386,11 +386,12 @@ def test_a_node_inside_below_absolute_zero_ends_the_run() -> None:
             "line": {"type": "lax_wendroff_line", "length": "2 m", "diameter": "10 mm", "max_pressure": "5 bar"},
         },
         nets={"start": ["left.port", "line.a"], "end": ["line.b", "right.port"]},
-        fluid={"type": "simple_oil", "density": "870 kg/m^3", "kinematic_viscosity": "1 cSt", "bulk_modulus": "1.6 GPa"},
+        fluid={"type": "simple_oil", "density": "870 kg/m^3", "kinematic_viscosity": "1 cSt",
+               "bulk_modulus": "1.6 GPa"},
         simulation={"stop": "5 ms"},
     )  # fmt: skip
     for solver in ("lsoda", "rodas"):
-        with pytest.raises(SimulationError, match="at a node, below absolute zero; .*distributed_line") as failure:
+        with pytest.raises(SimulationError, match=r"at a node, below absolute zero; .*distributed_line") as failure:
             made.simulate(solver=solver)
         result = failure.value.result  # type: ignore[attr-defined]
         assert result.time[-1] == pytest.approx(1.0 / math.sqrt(1.6e9 / 870), rel=3 * 0.9 / 16.5)

@@ -311,7 +311,7 @@ def test_column_separation_at_a_closed_end(solver: str, swap: bool) -> None:
     -2.7 h about P_c, of whose upper part, up to 4.7^2/(2 7.4) = 1.5 h ticks, the cavity gets nothing; it comes back
     twice with each echo. So the volume is short by up to 1.5 (1 + 2) ticks h/Z at its largest, and by 1.5 (1 + 3 2)
     before the collapse, which makes it 3.2 ticks early. Friction of the smooth bore at 0.3 m/s, f rho v^2 L/(2 d) with
-    f = 0.004, is 0.08 kPa, 1e-3 of h. Wylie & Streeter (1993), on column separation: the short pulse after the collapse.
+    f = 0.004, is 0.08 kPa, 1e-3 of h. Wylie & Streeter (1993), on column separation and the short pulse after it.
     """
     h = 1.01325e5 - 2e3
     Z = 870 * WAVE / (math.pi / 4 * WIDE**2)
