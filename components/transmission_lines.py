@@ -93,12 +93,15 @@ class TransmissionLine(LineWall, Component):
     between ticks they are parabolas that keep the mean, so the fluid in the line changes by what its ends take in,
     exactly. Fronts stay sharp to a tick; waves of less than 7 ticks per period may be taken for fronts. An end that
     gives its pressure answers flow at once, p = w + Z q, so between it and an orifice must stand a volume.
+    Such an end opens a vapour cavity, of volume `cavity_a` or `cavity_b` [m^3], rather than fall below the vapour
+    pressure; in fluid without vapour the run ends at absolute zero. A front takes a tick, so the volume is known to a
+    few ticks of flow: more `lumps` make it finer. An end that takes its pressure leaves cavities to the volume it meets.
     It keeps no books of energy: of what passes an end between two ticks only the fluid is summed up, and waves of one
     density and impedance carry p q, not the power of a fluid that can be compressed.
-    Not for aerated oil over a wide range of pressures, whose wave speed varies (`lax_wendroff_line`), nor for unsteady
-    friction of turbulent flow.
-    Source: Wylie & Streeter, Fluid Transients in Systems (1993), chapter 3 and section 3-4; P. Krus, K. Weddfelt,
-    J.-O. Palmberg, J. Dyn. Sys. Meas. Control 116 (1994) 132-136; Zielke (1968); Kagawa et al. (1983).
+    Not for cavities inside the line, away from its ends (`distributed_line`), for aerated oil over a wide range of
+    pressures, whose wave speed varies (`lax_wendroff_line`), nor for unsteady friction of turbulent flow.
+    Source: Wylie & Streeter, Fluid Transients in Systems (1993), chapter 3, section 3-4, and on column separation;
+    P. Krus, K. Weddfelt, J.-O. Palmberg, J. Dyn. Sys. Meas. Control 116 (1994) 132-136; Zielke (1968); Kagawa et al. (1983).
     """
 
     family: ClassVar[bool] = True
@@ -360,7 +363,8 @@ class TransmissionLineGivesGives(TransmissionLine):
     def equations(
         self, b_begin: Expr, b_end: Expr, b_mean: Expr, a_begin: Expr, a_end: Expr, a_mean: Expr, sent_a: Expr,
         sent_b: Expr, q_lump: Expr, drop: Expr, q_lag: Expr, t_node: Expr, into_a: Expr, into_b: Expr, had_a: Expr,
-        had_b: Expr, cavity_a: Expr, open_a: Expr, cavity_b: Expr, open_b: Expr, q_a: Expr, q_b: Expr, t: Expr, fluid: Fluid,
+        had_b: Expr, cavity_a: Expr, open_a: Expr, cavity_b: Expr, open_b: Expr, q_a: Expr, q_b: Expr, t: Expr,
+        fluid: Fluid,
     ) -> Equations:  # fmt: skip
         to_b, to_a = Waves(b_begin, b_end, b_mean), Waves(a_begin, a_end, a_mean)
         share, Z = (t - t_node) / self.tick(fluid), self.impedance(fluid)

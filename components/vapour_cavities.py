@@ -8,8 +8,8 @@ the waves then take away more than the end brings becomes a cavity, till they ha
 
 w [Pa] wave arriving; Z [Pa s/m^3]; q [m^3/s] flow into the end, q_w that into the line; V [m^3] volume of the cavity;
 P_c [Pa] gauge: the vapour pressure. All in SI, on floats and symbols.
-Source: discrete vapour cavity model (DVCM): Wylie & Streeter, Fluid Transients in Systems (1993), section 8-2, with the
-cavity at an end alone; A. Bergant, A. R. Simpson, A. S. Tijsseling, J. Fluids Struct. 22 (2006) 135-171, section 3.2.
+Source: discrete vapour cavity model (DVCM): Wylie & Streeter, Fluid Transients in Systems (1993), on column separation,
+with the cavity at an end alone; A. Bergant, A. R. Simpson, A. S. Tijsseling, J. Fluids Struct. 22 (2006) 135-171.
 """
 
 from dataclasses import dataclass

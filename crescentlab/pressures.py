@@ -23,8 +23,9 @@ ROUNDING = 1e-9
 SETTING = re.compile(r"(^|_)(pressure|preload)$")
 """Names of parameters that set a pressure, unlike drops, ranges and moduli."""
 CAVITATES = (
-    "the oil would cavitate: feed this part better, take a model that shows cavities (a capacity, or for a line a "
-    "distributed_line, in a fluid that evaporates), or write tension: true in the fluid to go on"
+    "the oil would cavitate: feed this part better, take a model that shows cavities in a fluid that evaporates (a "
+    "capacity; of lines a distributed_line, or a transmission_line at its ends), or write tension: true in the fluid "
+    "to go on"
 )
 """What to do about a pressure below absolute zero."""
 ASKED = (
