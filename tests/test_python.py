@@ -441,3 +441,14 @@ def test_the_ledger_is_not_switched_off_by_a_word(tmp_path: Path) -> None:
     mean = cl.load("crescent_pump").simulate("1 ms", {"volumes": "mean"})
     assert mean.balance is None
     assert mean.unbalanced == {"gears": "volumes: mean keeps its volumes as they are while they displace fluid"}
+
+
+def test_the_page_on_python_works_as_it_is_printed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    page = (ROOT / "docs" / "python.md").read_text(encoding="utf-8")
+    world: dict[str, Any] = {}
+    for block in re.findall(r"```python\n(.*?)```", page, re.DOTALL):
+        exec(compile(block, "docs/python.md", "exec"), world)
+    assert (world["again"]["line.p"] == world["result"]["line.p"]).all()
+    for name in re.findall(r"^\| `cl\.(\w+)\(", page, re.MULTILINE):
+        assert name in cl.__all__

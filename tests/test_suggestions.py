@@ -48,7 +48,7 @@ MISSING: dict[str, tuple[dict[str, Any], dict[str, list[str]], str, str]] = {
     ),
     "mass": ({"push": FORCE}, {"n": ["push.rod"]}, "n", "port"),
     "shaft": (
-        {"pump": {"type": "fixed_displacement_pump", "displacement": "10 cm^3"}, "low": {"type": "tank"},
+        {"pump": {"type": "fixed_displacement_pump", "displacement": "10 cm3/rev"}, "low": {"type": "tank"},
          "out": {"type": "tank"}},
         {"i": ["pump.inlet", "low.port"], "o": ["pump.outlet", "out.port"], "s": ["pump.shaft"]}, "s", "shaft",
     ),
@@ -99,7 +99,7 @@ def test_every_domain_names_a_whole_part(kind: domain.Domain) -> None:
 
 KEYS: dict[str, tuple[dict[str, str], str, str]] = {
     "speed of a pump": (
-        {"type": "fixed_displacement_pump", "displacement": "10 cm^3", "speed": "1500 rpm"},
+        {"type": "fixed_displacement_pump", "displacement": "10 cm3/rev", "speed": "1500 rpm"},
         "it comes in through the port shaft", "creep_speed",
     ),
     "force on a mass": (
