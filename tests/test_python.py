@@ -24,6 +24,8 @@ OIL = {
     "kinematic_viscosity": "35 cSt",
     "bulk_modulus": "14000 bar",
 }
+TENSE = {**OIL, "tension": "true"}
+"""Oil that goes on below absolute zero: starts from rest swing far."""
 
 
 @pytest.fixture(scope="module")
@@ -67,7 +69,9 @@ def test_what_is_raised_on_purpose_is_of_one_tree() -> None:
     inside = {"TooManyStepsError", "_GoneError", "NoRestError", "NotDifferentiableError"}
     for path in (ROOT / "crescentlab").rglob("*.py"):
         for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
-            if isinstance(node, ast.ClassDef) and node.name.endswith("Error") and path.name != "errors.py":
+            bases = [ast.unparse(base) for base in node.bases] if isinstance(node, ast.ClassDef) else []
+            if any(base.endswith(("Error", "Exception")) for base in bases) and path.name != "errors.py":
+                assert isinstance(node, ast.ClassDef)
                 assert node.name in inside, f"{path.name}: {node.name} belongs into errors.py"
     for name in cl.__all__:
         if name.endswith("Error"):
@@ -233,7 +237,8 @@ def test_vectors_are_whole_where_the_file_holds_all_their_elements(tmp_path: Pat
         "tank": {"type": "tank"},
     }
     nets = {"a": ["pump.port", "line.a"], "b": ["line.b", "can.port", "hole.a"], "t": ["hole.b", "tank.port"]}
-    run = cl.Circuit(Netlist.of({"crescentlab": "1", "fluid": OIL, "components": parts, "nets": nets})).simulate(0.01)
+    text = {"crescentlab": "1", "fluid": TENSE, "components": parts, "nets": nets}
+    run = cl.Circuit(Netlist.of(text)).simulate(0.01)
     run.write(tmp_path / "whole.nc")
     run.write(tmp_path / "part.nc", ["line.p_node[2]"])
     whole, part = cl.read(tmp_path / "whole.nc"), cl.read(tmp_path / "part.nc")
@@ -251,7 +256,7 @@ def test_a_table_has_one_row_an_instant(tmp_path: Path) -> None:
         "push": {"type": "force_source", "force": "5 N"},
         "body": {"type": "mass_with_stops", "mass": "1 kg", "high": "2 mm"},
     }
-    nets = {"n": ["push.port", "body.port"]}
+    nets = {"n": ["push.rod", "body.port"]}
     run = cl.Circuit(Netlist.of({"crescentlab": "1", "components": parts, "nets": nets})).simulate(0.1)
     assert (np.diff(run.time) == 0).any(), "the circuit has an event"
     table, both = run.to_dataframe(), run.to_dataframe(events="both")
@@ -304,7 +309,7 @@ JOINS = {
 def nodes(**simulation: str) -> cl.Circuit:
     return cl.Circuit(
         Netlist.of(
-            {"crescentlab": "1", "fluid": OIL, "parameters": {"p_0": "3 bar"}, "components": NODES, "nets": JOINS,
+            {"crescentlab": "1", "fluid": TENSE, "parameters": {"p_0": "3 bar"}, "components": NODES, "nets": JOINS,
              "simulation": {"stop": "1 s", **simulation}, "outputs": {"over": "= n1.p - p_0"}}
         )
     )  # fmt: skip
@@ -341,7 +346,7 @@ def test_a_derivative_sees_that_the_start_moves() -> None:
     circuit = nodes(start="steady")
     found = cl.sensitivity(circuit, "initial(n3.p)", "pump.flow", stop="1 ms")
     assert found.relative[0, 0] == pytest.approx(2, rel=0.02)
-    assert found.method == ("differences",)
+    assert found.method[0].startswith("central differences")
     with pytest.raises(cl.InputError, match="the run begins at the operating point, which moves"):
         cl.sensitivity(circuit, "initial(n3.p)", "pump.flow", stop="1 ms", method="exact")
 
@@ -405,9 +410,10 @@ def test_a_subclass_in_one_circuit_changes_no_other(tmp_path: Path) -> None:
     assert "OddPipe" in [form.__name__ for form in own.design().instances["pipe"].forms]
     assert other.design().instances["pipe"].forms == tuple(before) == tuple(Pipe.forms())
     assert type(own.plan().components["pipe"]) is type(other.plan().components["pipe"]), "its own forms come first"
+    odd = {**NODES, "pipe": {**NODES["pipe"], "start": {"odd": "1 bar"}}}
+    refused = cl.Circuit(Netlist.of({**text, "components": odd}))
     with pytest.raises(cl.InputError, match="no state 'odd' to start"):
-        odd = {**NODES, "pipe": {**NODES["pipe"], "start": {"odd": "1 bar"}}}
-        cl.Circuit(Netlist.of({**text, "components": odd})).design()
+        refused.design()
 
 
 WORD = '''
@@ -429,9 +435,20 @@ def test_the_ledger_is_not_switched_off_by_a_word(tmp_path: Path) -> None:
     (tmp_path / "word.py").write_text(WORD, encoding="utf-8")
     parts = {**NODES, "reader": {"type": "reader"}}
     nets = {**JOINS, "n1": [*JOINS["n1"], "reader.a"]}
-    text = {"crescentlab": "1", "library": ["./word.py"], "fluid": OIL, "components": parts, "nets": nets}
+    text = {"crescentlab": "1", "library": ["./word.py"], "fluid": TENSE, "components": parts, "nets": nets}
     run = cl.Circuit(Netlist.of(text, folder=tmp_path)).simulate(0.01)
     assert run.balance is not None
     mean = cl.load("crescent_pump").simulate("1 ms", {"volumes": "mean"})
     assert mean.balance is None
     assert mean.unbalanced == {"gears": "volumes: mean keeps its volumes as they are while they displace fluid"}
+
+
+def test_the_page_on_python_works_as_it_is_printed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    page = (ROOT / "docs" / "python.md").read_text(encoding="utf-8")
+    world: dict[str, Any] = {}
+    for block in re.findall(r"```python\n(.*?)```", page, re.DOTALL):
+        exec(compile(block, "docs/python.md", "exec"), world)
+    assert (world["again"]["line.p"] == world["result"]["line.p"]).all()
+    for name in re.findall(r"^\| `cl\.(\w+)\(", page, re.MULTILINE):
+        assert name in cl.__all__
