@@ -22,7 +22,7 @@ from crescentlab.solvers.functions import Functions
 from crescentlab.solvers.hybrid import ZENO_SPAN, Hybrid
 from crescentlab.solvers.jumps import ROWS, Chatter
 from crescentlab.solvers.limits import PressureLimits
-from crescentlab.solvers.options import ANGLE_STEP, RESTART_SHARE, Options
+from crescentlab.solvers.options import ANGLE_STEP, RESTART_SHARE, TOLERANCE_SHARE, Options
 from crescentlab.solvers.pace import CLOCK_SWING, clock_pace
 from crescentlab.solvers.promotion import Promotion
 from crescentlab.solvers.records import Records, on_grid
@@ -205,8 +205,9 @@ class _CompiledRun:
     def set_task(self) -> None:
         r, o = self.run_, self.options
         r.method = native.METHODS[o.solver]
-        r.start, r.stop, r.rtol, r.step_cap = o.start, o.stop, o.rtol, o.step_cap
-        r.angle_step, r.clock_swing, r.restart_share = ANGLE_STEP, CLOCK_SWING, RESTART_SHARE
+        share = TOLERANCE_SHARE.get(o.solver, 1.0)
+        r.start, r.stop, r.rtol, r.step_cap = o.start, o.stop, share * o.rtol, o.step_cap
+        r.angle_step, r.clock_swing, r.restart_share = ANGLE_STEP, CLOCK_SWING, RESTART_SHARE / share
         r.tolerance = self.hybrid.time_tolerance
         r.t = o.start
         pace = clock_pace(self.system, self.values, o.start, o.stop)
@@ -214,7 +215,7 @@ class _CompiledRun:
             r.n_pace = pace[0].size
             r.give(pace_t=_real(pace[0]), pace_s=_real(pace[1]))
         floor, held_floor = self.limits.states.ending, self.limits.held.ending
-        r.give(atol=_real(self.atol), floor=_real(floor), held_floor=_real(held_floor))
+        r.give(atol=_real(share * self.atol), floor=_real(floor), held_floor=_real(held_floor))
 
     def set_scratch(self) -> None:
         r, n = self.run_, self.run_.n

@@ -16,6 +16,7 @@ from scipy.sparse.csgraph import reverse_cuthill_mckee
 
 from crescentlab.errors import InputError, SimulationError
 from crescentlab.solvers.functions import Functions
+from crescentlab.solvers.options import TOLERANCE_SHARE
 
 SMALL = 25
 """Up to this many states LSODA with a full matrix is quickest (benchmarks/thresholds.py)."""
@@ -33,14 +34,10 @@ CVODE_BAND = 50
 LARGEST_FULL = 3000
 """A full matrix of more rows takes over 70 MB and a second to factorise."""
 
-MULTISTEP_SHARE = 0.2
-"""Share of the tolerance that LSODA, BDF and CVODE work to: at equal rtol their errors add up to some 20 times those of
-the Runge-Kutta methods (benchmarks/pump.py)."""
-
 MOST_STIFF = {"rk45": 2.2, "dop853": 4.0}
-"""Largest h |lambda| of the explicit methods. Up to 3.3 and 6.1 they are stable, but there what is fast is damped no more:
-its error stays, at some ten tolerances, and what is slow adds it up; DOP853's interpolant shows it twentyfold between the
-steps. At these limits a step shrinks it to a fifth or less, and between steps a tenth of it is seen."""
+"""Largest h |lambda| of the explicit methods. Up to 3.3 and 6.1 they are stable, but there what is fast is damped no
+more: its error stays, at some ten tolerances, and what is slow adds it up; DOP853's interpolant shows it twentyfold
+between the steps. At these limits a step shrinks it to a fifth or less, and between steps a tenth of it is seen."""
 DEFECT_AT = (0.25, 0.75)
 """Where in a step the interpolant is held against f."""
 MOST_DEFECT = 10.0
@@ -65,7 +62,7 @@ class Stepper:
 
     def __init__(self, name: str, functions: Functions, rtol: float, atol: np.ndarray, layout: str) -> None:
         self.name, self.functions = name, functions
-        share = MULTISTEP_SHARE if name in ("lsoda", "bdf", "cvode") else 1.0
+        share = TOLERANCE_SHARE.get(name, 1.0)
         self.rtol, self.atol = max(share * rtol, 100 * np.finfo(float).eps), share * atol
         self.order: np.ndarray | None = None
         self.place: np.ndarray | None = None
