@@ -95,13 +95,14 @@ class TransmissionLine(LineWall, Component):
     gives its pressure answers flow at once, p = w + Z q, so between it and an orifice must stand a volume.
     Such an end opens a vapour cavity, of volume `cavity_a` or `cavity_b` [m^3], rather than fall below the vapour
     pressure; in fluid without vapour the run ends at absolute zero. A front takes a tick, so the volume is known to a
-    few ticks of flow: more `lumps` make it finer. An end that takes its pressure leaves cavities to the volume it meets.
+    few ticks of flow: more `lumps` make it finer. An end that takes its pressure leaves cavities to the volume there.
     It keeps no books of energy: of what passes an end between two ticks only the fluid is summed up, and waves of one
     density and impedance carry p q, not the power of a fluid that can be compressed.
     Not for cavities inside the line, away from its ends (`distributed_line`), for aerated oil over a wide range of
     pressures, whose wave speed varies (`lax_wendroff_line`), nor for unsteady friction of turbulent flow.
     Source: Wylie & Streeter, Fluid Transients in Systems (1993), chapter 3, section 3-4, and on column separation;
-    P. Krus, K. Weddfelt, J.-O. Palmberg, J. Dyn. Sys. Meas. Control 116 (1994) 132-136; Zielke (1968); Kagawa et al. (1983).
+    P. Krus, K. Weddfelt, J.-O. Palmberg, J. Dyn. Sys. Meas. Control 116 (1994) 132-136; Zielke (1968); Kagawa et al.
+    (1983).
     """
 
     family: ClassVar[bool] = True
