@@ -81,14 +81,18 @@ OF_TYPE: dict[str, tuple[float, float]] = {
     "rotary_friction.static_friction": (3.0, 5.0), "rotary_friction.coulomb_friction": (0.5, 2.5),
     "rotary_friction.viscous_friction": (0.01, 0.1), "fan_load.rated_speed": (100.0, 200.0),
     "torsion_spring.preload": (-2.0, 2.0), "pressure_source.pressure": (0.0, 60e5), "tank.pressure": (0.0, 5e5),
-    "flow_source.flow": (-10 / 6e4, 30 / 6e4), "motion_source.velocity": (-0.05, 0.05), "force_source.force": (-500.0, 500.0),
-    "torque_source.torque": (-5.0, 5.0), "rated_orifice.rated_flow": (5 / 6e4, 40 / 6e4), "floating_lever.share": (0.2, 0.8),
+    "flow_source.flow": (-10 / 6e4, 30 / 6e4), "motion_source.velocity": (-0.05, 0.05),
+    "force_source.force": (-500.0, 500.0),
+    "torque_source.torque": (-5.0, 5.0), "rated_orifice.rated_flow": (5 / 6e4, 40 / 6e4),
+    "floating_lever.share": (0.2, 0.8),
     "compliant_capacity.wall_area": (1e-4, 1e-3), "piston_chamber.dead_volume": (5e-5, 1e-4),
     "piston_chamber.diameter": (10e-3, 30e-3), "moving_annular_gap.length": (10e-3, 40e-3),
     "leakage_land.overlap": (1e-3, 5e-3), "second_order_lag.damping_ratio": (0.2, 1.0), "gear_ratio.ratio": (0.5, 2.0),
-    "transfer_function.time_unit": (1e-3, 5e-3), "bend.radius": (20e-3, 60e-3), "swash_plate.pitch_radius": (10e-3, 20e-3),
+    "transfer_function.time_unit": (1e-3, 5e-3), "bend.radius": (20e-3, 60e-3),
+    "swash_plate.pitch_radius": (10e-3, 20e-3),
     "two_two_valve.overlap": (-0.2, 0.2), "three_two_valve.overlap": (-0.2, 0.2), "four_two_valve.overlap": (-0.2, 0.2),
-    "four_three_valve.overlap": (-0.2, 0.2), "short_tube.length": (5e-3, 50e-3), "spool_drive.damping_ratio": (0.3, 1.0),
+    "four_three_valve.overlap": (-0.2, 0.2), "short_tube.length": (5e-3, 50e-3),
+    "spool_drive.damping_ratio": (0.3, 1.0),
     "energy_counter.start": (0.0, 0.0), "cushion.end": (0.0, 5e-3), "elastic_contact.clearance": (0.0, 5e-3),
 }  # fmt: skip
 """... and by type and name."""
@@ -104,8 +108,10 @@ SIGNALS: dict[str, tuple[float, float]] = {
 """The range of a signal of a quantity, SI."""
 
 SENSORS = {
-    "pressure": ("pressure_sensor", "differential_pressure_sensor"), "flow": ("flow_sensor",), "speed": ("speed_sensor",),
-    "angle": ("angle_sensor",), "length": ("position_sensor",), "velocity": ("velocity_sensor",), "force": ("force_sensor",),
+    "pressure": ("pressure_sensor", "differential_pressure_sensor"), "flow": ("flow_sensor",),
+    "speed": ("speed_sensor",),
+    "angle": ("angle_sensor",), "length": ("position_sensor",), "velocity": ("velocity_sensor",),
+    "force": ("force_sensor",),
     "torque": ("torque_sensor",), "power": ("hydraulic_power_meter", "linear_power_meter", "shaft_power_meter"),
     "volume": ("volume_counter",),
 }  # fmt: skip
@@ -474,7 +480,8 @@ class Growing:
         elif kind == "table2d":
             inputs = {"u1": sensed, "u2": quantity}
             fixed = {"table": {
-                "x": [text(there, input_low), text(there, middle), text(there, input_high)], "y": [text(of, low), text(of, high)],
+                "x": [text(there, input_low), text(there, middle), text(there, input_high)],
+                "y": [text(of, low), text(of, high)],
                 "z": [[text(of, draw.uniform(low, high)) for _ in range(2)] for _ in range(3)],
             }}  # fmt: skip
         elif kind == "spool_drive":

@@ -91,7 +91,8 @@ def check(kinds: list[str], seed: int, stop: str, most: int, counts: Counter[str
         if found.multiple > multiple or found.events or found.ended:
             wrong.append(f"{solver}: {found}")
     if wrong and "COLLECT" in os.environ:
-        open(os.environ["COLLECT"], "a").write(f"{kinds!r}\t{seed}\t{wrong}\n")
+        with open(os.environ["COLLECT"], "a") as file:
+            file.write(f"{kinds!r}\t{seed}\t{wrong}\n")
         return
     if wrong:
         note(f"seed {seed}, types {kinds}\n{yaml_text(data)}")
