@@ -332,9 +332,12 @@ class _Assembly:
         curved = np.array(ca.which_depends(g, self.t, 2, True), bool) if n and timed.any() else np.zeros(n, bool)
         curved[n - len(on_time.bits) :] = ~np.array(on_time.straight, bool)
         held = _depends(g, ca.vertcat(self.h, b)) if n else np.zeros(0, bool)
+        floor = np.isin(np.arange(n), range(first, first + floors))
+        stepwise = floor & timed & curved & held  # sought in every step; a scan ahead would be due at every tick
+        on_state, timed, curved = on_state | stepwise, timed & ~stepwise, curved & ~stepwise
         return Bits(
             tuple(names), np.array(strict, bool), on_state, timed, timed & ~curved, held, np.array(switches, bool),
-            np.isin(np.arange(n), range(first, first + floors)),
+            floor,
         )  # fmt: skip
 
     def remap(self, may_fire: list[bool]) -> tuple[ca.SX, list[ca.SX]]:
