@@ -125,8 +125,8 @@ def verification(first: Result, second: Result, rtol: float, tighter: float) -> 
     """Compare a run with the same at a tighter tolerance.
 
     Over the time that both cover, at the first run's steps and halfway between. Instants between the times of an
-    event, or of a relation's turn, in the one run and in the other are left out: the difference there is the whole jump. Times of
-    events are compared instead.
+    event, or of a relation's turn, in the one run and in the other are left out: the difference there is the whole
+    jump. Times of events are compared instead.
     """
     one, other = first.trajectory, second.trajectory
     ended = ""
