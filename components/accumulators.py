@@ -7,7 +7,7 @@ from pydantic import Field
 from crescentlab.component import Component, Equations
 from crescentlab.domain import gives_pressure, held, observable, state, stores, stores_energy
 from crescentlab.fluid import Fluid
-from crescentlab.maths import Expr, event_where, exp, log, when, where
+from crescentlab.maths import Expr, event_where, exp, fail_when, log, when, where
 from crescentlab.units import Energy, Pressure, Ratio, Volume
 
 
@@ -138,4 +138,8 @@ class PistonSeparator(Component):
             "stops_at_b": when(free & (V_a > high), V_a=high, pressure_a=common, pressure_b=common, at=1.0),
             "leaves": when((at == -1) & (pressure_a > pressure_b) | (at == 1) & (pressure_a < pressure_b), at=0.0),
             "starts": when(at == -2, at=rests),
+            "used_up": fail_when(
+                (V_a < self.dead_volume / 2) | (V_b < self.dead_volume / 2),
+                "a side has used up its dead volume; start V_a between the stops",
+            ),
         }

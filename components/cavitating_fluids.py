@@ -28,6 +28,10 @@ from .oil_grades import GRADES
 from .viscosity_laws import CST, barus_factor, walther_viscosity, wooster_coefficient
 
 ZERO_CELSIUS = 273.15
+COLDEST, HOTTEST = ZERO_CELSIUS - 50, ZERO_CELSIUS + 150
+"""Temperatures [K] between which API MPMS 11.1 gives the density of oils: -58 to 302 degF."""
+THINNEST = 2e-6
+"""Viscosity [m^2/s] from which on ASTM D341 draws a straight line; thinner oils need its further terms."""
 GAS_CONSTANT_OF_STEAM = 461.526
 """Specific gas constant of water [J/(kg K)]."""
 
@@ -77,6 +81,11 @@ class _Evaporating(Fluid):
                 f"(1 + vapour_range) must lie below {self.atmospheric_pressure / 1e5:g} bar; lower one of them"
             )
         return self
+
+    @property
+    def cavity_pressure(self) -> Any:
+        """Pressure [Pa, gauge] at which it evaporates."""
+        return self._vapour()[0] - self.atmospheric_pressure
 
     def density(self, p: Expr) -> Expr:
         """rho(p) [kg/m^3]."""
@@ -230,13 +239,31 @@ class MineralOil(_Evaporating, _DataSheet):
     effective one: that of oil itself is below 1 Pa, that of its light ends and water unknown. Not for heat: a change of
     temperature within a run. Source: ASTM D341; Barus, Wooster in Stachowiak & Batchelor, Engineering Tribology,
     chapter 2; API MPMS 11.1 (lubricating oils); A. T. J. Hayward, How to estimate the bulk modulus of hydraulic
-    fluids, Hydraulic Pneumatic Power 16 (1970) 28-40, within 5 % up to 800 bar; ISO 3448, SAE J300 and makers' data
-    sheets for the grades.
+    fluids, Hydraulic Pneumatic Power 16 (1970) 28-40, within 5 % up to 800 bar, which is `highest_pressure`; ISO 3448,
+    SAE J300 and makers' data sheets for the grades.
     """
 
+    highest_pressure: Pressure = Field(
+        default=800e5, gt=0, description="gauge pressure up to which its law is meant; beyond, a run warns"
+    )
     air_fraction: Ratio = Field(default=5e-3, ge=0, lt=1, description="gas volume over total volume at the atmosphere")
     vapour_pressure: Pressure = Field(default=1e3, gt=0, description="absolute pressure at which the oil evaporates")
     vapour_density: Density = Field(default=0.02, gt=0, description="density of the vapour at the vapour pressure")
+
+    def remarks(self) -> list[str]:
+        """Temperatures beyond the tables of the density, and viscosities below the chart's straight line."""
+        celsius, viscosity = self.temperature - ZERO_CELSIUS, float(self._viscosity_at(self.temperature))
+        if not COLDEST <= self.temperature <= HOTTEST:
+            low, high = COLDEST - ZERO_CELSIUS, HOTTEST - ZERO_CELSIUS
+            return [
+                f"its temperature is {celsius:.4g} degC; the law of its density is meant for {low:g} to {high:g} degC"
+            ]
+        if viscosity < THINNEST:
+            return [
+                f"its viscosity is {viscosity / CST:.3g} cSt at {celsius:.4g} degC; the straight line of the viscosity "
+                f"chart is meant from {THINNEST / CST:g} cSt on"
+            ]
+        return []
 
     def kinematic_viscosity(self, p: Expr) -> Expr:
         """nu(p) [m^2/s] of the liquid: mu_0 exp(alpha p)/rho_l(p)."""
@@ -280,7 +307,8 @@ class Water(_Evaporating):
     vapour as in `cavitating_oil` with the density of a perfect gas, air as in `aerated_oil`. Not for steam, ice, nor
     salt water. Source: \mu: IAPWS SR6-08 (2011); \rho_l: G. S. Kell, J. Chem. Eng. Data 20 (1975) 97-105; c: W.
     Marczak, J. Acoust. Soc. Am. 102 (1997) 2776-2779; P_v: W. Wagner, A. Pruss, J. Phys. Chem. Ref. Data 31 (2002)
-    387-535, Eq. 2.5; rise of the modulus: the speed of sound of IAPWS-95 at 20 degC up to 1000 bar.
+    387-535, Eq. 2.5; rise of the modulus: the speed of sound of IAPWS-95 at 20 degC up to 1000 bar,
+    which is `highest_pressure`.
     """
 
     temperature: Temperature = Field(

@@ -13,7 +13,7 @@ from crescentlab.fluid import Fluid
 from crescentlab.maths import Expr, pi
 from crescentlab.units import Area, Flow, Frequency, Ratio
 
-from .valve_laws import Metering, clipped, edge_share, follower, middle_share
+from .valve_laws import Metering, edge_share, follower, middle_share
 
 
 class Lapped(BaseModel):
@@ -44,7 +44,7 @@ class SpoolDrive(Component):
     natural_frequency: Frequency = Field(gt=0, description="undamped natural frequency of the spool")
     damping_ratio: Ratio = Field(default=0.7, ge=0, description="damping over critical damping")
 
-    command = takes_signal(Ratio, "stroke asked for, -1 to 1")
+    command = takes_signal(Ratio, "stroke asked for", low=-1, high=1)
     stroke = gives_signal(Ratio, "stroke of the spool, -1 to 1")
     position = state(Ratio, "stroke of the spool", start=0.0, nominal=1.0)
     rate = state(Frequency, "strokes per time", start=0.0, nominal=100.0)
@@ -52,7 +52,7 @@ class SpoolDrive(Component):
 
     def equations(self, position: Expr, rate: Expr, at: Expr, command: Expr) -> Equations:
         omega = 2 * pi * self.natural_frequency
-        moves = follower(position, rate, at, clipped(command, -1.0), omega, self.damping_ratio, low=-1.0)
+        moves = follower(position, rate, at, command, omega, self.damping_ratio, low=-1.0)
         return {"stroke": position, **moves}
 
 
@@ -77,7 +77,7 @@ class TwoTwoValve(Metering, Component):
 
     a = takes_pressure("inlet")
     b = takes_pressure("outlet")
-    stroke = takes_signal(Ratio, "0 is closed, 1 is open")
+    stroke = takes_signal(Ratio, "0 is closed, 1 is open", low=0, high=1)
     q = observable(Flow, "flow from a to b")
     loss = dissipates()
 
@@ -104,7 +104,7 @@ class ThreeTwoValve(Metering, Lapped, Component):
     supply = takes_pressure("supply port P")
     work = takes_pressure("work port A")
     tank = takes_pressure("tank port T")
-    stroke = takes_signal(Ratio, "0 joins work port and tank, 1 supply and work port")
+    stroke = takes_signal(Ratio, "0 joins work port and tank, 1 supply and work port", low=0, high=1)
     q_in = observable(Flow, "flow from supply to work port")
     q_out = observable(Flow, "flow from work port to tank")
     loss = dissipates()
@@ -135,7 +135,7 @@ class FourTwoValve(Metering, Lapped, Component):
     a = takes_pressure("work port A")
     b = takes_pressure("work port B")
     tank = takes_pressure("tank port T")
-    stroke = takes_signal(Ratio, "0 joins P with B and A with T, 1 P with A and B with T")
+    stroke = takes_signal(Ratio, "0 joins P with B and A with T, 1 P with A and B with T", low=0, high=1)
     q_supply_a = observable(Flow, "flow from P to A")
     q_supply_b = observable(Flow, "flow from P to B")
     q_a_tank = observable(Flow, "flow from A to T")
@@ -191,7 +191,7 @@ class FourThreeValve(Metering, Lapped, Component):
     a = takes_pressure("work port A")
     b = takes_pressure("work port B")
     tank = takes_pressure("tank port T")
-    stroke = takes_signal(Ratio, "-1 to 1; above 0 joins P with A and B with T")
+    stroke = takes_signal(Ratio, "above 0 joins P with A and B with T, below 0 P with B and A with T", low=-1, high=1)
     q_supply_a = observable(Flow, "flow from P to A")
     q_supply_b = observable(Flow, "flow from P to B")
     q_a_tank = observable(Flow, "flow from A to T")
@@ -201,14 +201,15 @@ class FourThreeValve(Metering, Lapped, Component):
 
     def equations(self, p_supply: Expr, p_a: Expr, p_b: Expr, p_tank: Expr, stroke: Expr, fluid: Fluid) -> Equations:
         tank_overlap = self.overlap if self.tank_overlap is None else self.tank_overlap
+        area_b = self.area_ratio * self.area
 
         def returned(x: Any) -> Any:
             return edge_share(x, tank_overlap, self.edge_rounding)
 
         p_to_a = self.metered(p_supply, p_a, self.opened(stroke), fluid)
-        p_to_b = self.metered(p_supply, p_b, self.area_ratio * self.opened(-stroke), fluid)
+        p_to_b = self.through(p_supply, p_b, area_b * self.opened(-stroke), fluid)
         a_to_t = self.metered(p_a, p_tank, returned(-stroke), fluid)
-        b_to_t = self.metered(p_b, p_tank, self.area_ratio * returned(stroke), fluid)
+        b_to_t = self.through(p_b, p_tank, area_b * returned(stroke), fluid)
         middle = self.tandem_area * middle_share(stroke, self.tandem_stroke, self.edge_rounding)
         p_to_t = self.through(p_supply, p_tank, middle, fluid)
         return {

@@ -120,14 +120,14 @@ class VariableDisplacementPump(_Rated, Component):
     inlet = takes_pressure("inlet")
     outlet = takes_pressure("outlet")
     shaft = takes_rotation("the shaft")
-    setting = takes_signal(Ratio, "share of the largest displacement, -1 to 1")
+    setting = takes_signal(Ratio, "share of the largest displacement", low=-1, high=1)
     q = observable(Flow, "flow from inlet to outlet")
     torque = observable(Torque, "torque of the shaft on the machine, positive while pumping")
     hydraulic_power = observable(Power, "power given to the oil, negative while motoring")
     loss = dissipates()
 
     def equations(self, p_inlet: Expr, p_outlet: Expr, omega_shaft: Expr, setting: Expr, fluid: Fluid) -> Equations:
-        return self._law(minimum(maximum(setting, -1.0), 1.0), p_inlet, p_outlet, omega_shaft, fluid)
+        return self._law(setting, p_inlet, p_outlet, omega_shaft, fluid)
 
 
 class VariableDisplacementMotor(VariableDisplacementPump):

@@ -7,7 +7,7 @@ from pydantic import Field, model_validator
 from crescentlab.component import Component, Equations
 from crescentlab.domain import dissipates, observable, takes_motion, takes_pressure, takes_rotation, takes_signal
 from crescentlab.fluid import Fluid
-from crescentlab.maths import Expr, log, maximum, pi, sqrt
+from crescentlab.maths import Expr, log, pi, sqrt
 from crescentlab.units import Angle, Flow, Force, Length, Ratio, Torque
 
 from .flow_laws import annular_flow, drag_flow, radial_flow, slot_flow
@@ -75,10 +75,9 @@ class VariableWidthGap(Component):
 
     .. math:: q = \frac{\rho}{\rho_0} n \frac{s b h^3}{12 \mu l} (p_a - p_b)
 
-    s = `opening` [-], open share of b = `width` [m], below 0 counts as 0; h = `height`, l = `length` [m]; n =
-    `parallel` [-] gaps side by side; p [Pa] gauge; \mu [Pa s], \rho [kg/m^3] at the mean pressure, \rho_0 at 0 bar
-    gauge. With `count` a vector of gaps, each with its own opening. Not for turbulent flow. Source: Rundo & Corvaglia
-    (2016), Eq. 22.
+    s = `opening` [-], open share of b = `width` [m]; h = `height`, l = `length` [m]; n = `parallel` [-] gaps side by
+    side; p [Pa] gauge; \mu [Pa s], \rho [kg/m^3] at the mean pressure, \rho_0 at 0 bar gauge. With `count` a vector of
+    gaps, each with its own opening. Not for turbulent flow. Source: Rundo & Corvaglia (2016), Eq. 22.
     """
 
     width: Length = Field(gt=0, description="across the flow, when fully open")
@@ -89,13 +88,12 @@ class VariableWidthGap(Component):
 
     a = takes_pressure("upstream", size="count")
     b = takes_pressure("downstream", size="count")
-    opening = takes_signal(Ratio, "open share of the width", size="count")
+    opening = takes_signal(Ratio, "open share of the width", size="count", low=0, high=1)
     q = observable(Flow, "flow from a to b", size="count")
     loss = dissipates()
 
     def equations(self, p_a: Expr, p_b: Expr, opening: Expr, fluid: Fluid) -> Equations:
-        width = self.width * maximum(opening, 0.0)
-        q = self.parallel * slot_flow(p_a, p_b, width, self.height, self.length, fluid)
+        q = self.parallel * slot_flow(p_a, p_b, self.width * opening, self.height, self.length, fluid)
         return {"q_a": q, "q_b": -q, "q": q}
 
 

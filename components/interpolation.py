@@ -21,7 +21,7 @@ from crescentlab.maths import event_where, maximum, minimum, piecewise, stack, t
 from crescentlab.schedule import Schedule
 
 
-def curvatures(knots: Sequence[float], values: np.ndarray, *, closed: bool = False) -> np.ndarray:
+def curvatures(knots: Sequence[float] | np.ndarray, values: np.ndarray, *, closed: bool = False) -> np.ndarray:
     """Second derivatives of the cubic spline at n knots from the values there, (n,) or (n, m).
 
     Zero at both ends; a ``closed`` one, whose first and last values are equal, goes on smoothly from its end to its
@@ -124,9 +124,9 @@ class Pieces:
     def schedule(self) -> Schedule:
         """Rows of origin and coefficients, for a held vector that :func:`on_piece` reads; equal neighbours are one."""
         rows = np.column_stack([self.origins, self.coefficients.reshape(self.origins.size, -1)])
-        constant = ~self.coefficients[:, :, 1:].any(axis=(1, 2))
-        same = constant[1:] & constant[:-1] & (self.coefficients[1:] == self.coefficients[:-1]).all(axis=(1, 2))
-        keep = np.concatenate([[True], ~same])
+        constant = np.all(self.coefficients[:, :, 1:] == 0, axis=(1, 2))
+        same = constant[1:] & constant[:-1] & np.all(self.coefficients[1:] == self.coefficients[:-1], axis=(1, 2))
+        keep = np.concatenate([[True], np.logical_not(same)])
         return Schedule(self.begins[keep], rows[keep])
 
 
@@ -140,7 +140,11 @@ def on_piece(x: Any, piece: Any, column: int, degree: int) -> Any:
 
 
 def pieces(
-    x: Sequence[float], y: np.ndarray, course: Course, beyond: Beyond, reach: tuple[float, float] = (0.0, 0.0)
+    x: Sequence[float] | np.ndarray,
+    y: np.ndarray,
+    course: Course,
+    beyond: Beyond,
+    reach: tuple[float, float] = (0.0, 0.0),
 ) -> Pieces:
     """Pieces through points whose ``x`` (n,) do not fall; ``y`` (n,) or (n, columns).
 

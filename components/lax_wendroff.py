@@ -9,7 +9,7 @@ from pydantic import Field
 from crescentlab.component import Component, Equations, structural
 from crescentlab.domain import gives_pressure, held, observable, state, stores, takes_pressure, undecided_pressure
 from crescentlab.fluid import Fluid
-from crescentlab.maths import Expr, every, fabs, fail_when, maximum, pi, stack, total
+from crescentlab.maths import Expr, every, fabs, fail_when, maximum, minimum, pi, stack, total
 from crescentlab.units import Flow, Length, Pressure, Ratio, Time, Volume
 
 from .flow_laws import pipe_friction_drop
@@ -28,6 +28,8 @@ from .wave_laws import (
 
 CELL_LENGTH_OVER_DIAMETER = 6
 """Length over diameter [-] of the cells, where `internal_nodes` is not given."""
+BELOW = 1e-9
+"""Share of the atmosphere by which rounding may put a node below absolute zero."""
 
 LOSS_STEPS = 3
 """Steps to the density ahead of an entry loss, each to a share of loss over bulk modulus: numerics."""
@@ -59,7 +61,7 @@ class LaxWendroffLine(Component):
     It keeps no books of energy: of what passes an end between two ticks only the fluid is summed up, and what the
     scheme takes from steep waves at a tick is no friction.
     Not for friction that depends on frequency, for flow near the speed of sound (the convective term, v/a, is left
-    out), or for lines of less than some ten diameters.
+    out), for lines of less than some ten diameters, nor for cavities: a node below absolute zero ends the run.
     Source: R. D. Richtmyer, NCAR Technical Note 63-2 (1962); Wylie & Streeter, Fluid Transients in Systems (1993),
     chapter 3; used for the test rig's pipe in Rundo & Corvaglia (2016), section 6.1.
     """
@@ -91,6 +93,7 @@ class LaxWendroffLine(Component):
     q = observable(Flow, "flow from a to b, at a")
     courant = observable(Ratio, "largest Courant number of the nodes; above 1 the scheme is not valid")
     p_highest = observable(Pressure, "highest pressure of the nodes; max_pressure must not be below it")
+    p_lowest = observable(Pressure, "lowest pressure of the nodes; below absolute zero the run ends")
     content = stores()
 
     @property
@@ -182,7 +185,15 @@ class LaxWendroffLine(Component):
 
         r = fluid.density(p_node) / fluid.rho_0
         courant = reduce(maximum, wave_speed(p_node, fluid) + fabs(q_node) / (area * r)) * dt / dx
-        return {
+        shared: Equations = {} if fluid.tension else {
+            "below_zero": fail_when(
+                reduce(minimum, p_node) < -fluid.atmospheric_pressure * (1 + BELOW),
+                "its pressure falls to {p_lowest} gauge at a node, below absolute zero; the oil would cavitate, and "
+                "this line shows no cavities: take a distributed_line in a fluid that evaporates, or a "
+                "transmission_line, which opens a cavity at its ends, or write tension: true in the fluid to go on",
+            )
+        }  # fmt: skip
+        return shared | {
             "der_into_a": q_a,
             "der_into_b": q_b,
             "q": q_a,
@@ -193,6 +204,7 @@ class LaxWendroffLine(Component):
                 "write a max_pressure above the highest pressure that comes, at least {p_highest}",
             ),
             "p_highest": reduce(maximum, p_node),
+            "p_lowest": reduce(minimum, p_node),
             "content": area * dx * (total(r) - (r[0] + r[-1]) / 2) + taken_a + taken_b,
             "tick": every(
                 dt,

@@ -5,7 +5,7 @@ from pydantic import Field
 from crescentlab.component import Component, Equations
 from crescentlab.domain import dissipates, observable, takes_pressure, takes_signal
 from crescentlab.fluid import Fluid
-from crescentlab.maths import Expr, maximum, sqrt
+from crescentlab.maths import Expr, sqrt
 from crescentlab.units import Area, Density, Flow, Length, Pressure, Ratio
 
 from .flow_laws import DIAMETER_ROUNDING, hydraulic_diameter_of, orifice_flow, referred_flow, rising_root
@@ -60,10 +60,10 @@ class VariableOrifice(Component):
     .. math:: q = n\, C_d\, sA \sqrt{2\rho|\Delta p|}/\rho_0\; \mathrm{sign}\,\Delta p, \quad
               C_d = C_{d,max} \tanh(2\lambda/\lambda_c), \quad \lambda = (d_h/\nu)\sqrt{2|\Delta p|/\rho}
 
-    s = `opening` [-], share of A = `area` [m^2] that is open; below 0 counts as 0; \Delta p = p_a - p_b [Pa]; d_h [m],
-    by default \sqrt{4sA/\pi + d_r^2} with d_r = `diameter_rounding` [m]; \rho [kg/m^3] and \nu [m^2/s] at the mean
-    pressure, \rho_0 at 0 bar gauge; n = `parallel` [-]. With `count` a vector of orifices, each with its own opening.
-    Finite Jacobian at \Delta p = 0 and s = 0. Not for cavitating flow.
+    s = `opening` [-], share of A = `area` [m^2] that is open; \Delta p = p_a - p_b [Pa]; d_h [m], by default
+    \sqrt{4sA/\pi + d_r^2} with d_r = `diameter_rounding` [m]; \rho [kg/m^3] and \nu [m^2/s] at the mean pressure,
+    \rho_0 at 0 bar gauge; n = `parallel` [-]. With `count` a vector of orifices, each with its own opening. Finite
+    Jacobian at \Delta p = 0 and s = 0. Not for cavitating flow.
     Source: Rundo & Corvaglia (2016), Eqs. 27-29.
     """
 
@@ -77,12 +77,12 @@ class VariableOrifice(Component):
 
     a = takes_pressure("upstream", size="count")
     b = takes_pressure("downstream", size="count")
-    opening = takes_signal(Ratio, "open share of the area", size="count")
+    opening = takes_signal(Ratio, "open share of the area", size="count", low=0, high=1)
     q = observable(Flow, "flow from a to b", size="count")
     loss = dissipates()
 
     def equations(self, p_a: Expr, p_b: Expr, opening: Expr, fluid: Fluid) -> Equations:
-        area = self.area * maximum(opening, 0.0)
+        area = self.area * opening
         d_h = self.hydraulic_diameter
         if d_h is None:
             d_h = hydraulic_diameter_of(area, self.diameter_rounding)

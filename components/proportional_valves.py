@@ -10,7 +10,7 @@ from pydantic import Field
 from crescentlab.component import Component, Equations
 from crescentlab.domain import dissipates, observable, reads_pressure, state, takes_pressure, takes_signal
 from crescentlab.fluid import Fluid
-from crescentlab.maths import Expr, fabs, maximum, sqrt
+from crescentlab.maths import Expr, fabs, sqrt
 from crescentlab.units import Area, Flow, Pressure, Ratio
 
 from .pressure_valves import Lagging
@@ -21,9 +21,9 @@ class ProportionalReliefValve(Lagging, Metering, Component):
     r"""Proportional relief valve: a signal sets its cracking pressure, as the current of a solenoid does.
 
     .. math:: q = C_d\, s A \sqrt{2\rho|\Delta p|}/\rho_0\, \mathrm{sign}\,\Delta p, \quad
-              T \frac{ds}{dt} = \frac{\Delta p - \max(p_c, 0)}{p_r} - s, \quad 0 \le s \le 1
+              T \frac{ds}{dt} = \frac{\Delta p - p_c}{p_r} - s, \quad 0 \le s \le 1
 
-    \Delta p = p_a - p_b [Pa]; p_c = `setting` [Pa], below 0 counted as 0; p_r = `opening_range` [Pa]; s = `lift` [-]; A
+    \Delta p = p_a - p_b [Pa]; p_c = `setting` [Pa], from 0 on; p_r = `opening_range` [Pa]; s = `lift` [-]; A
     = `area` [m^2]; T = `time_constant` [s]; C_d [-] follows the flow number as in `orifice`; \rho [kg/m^3] at the mean
     pressure. At rest it passes q at \Delta p = p_c + s p_r, as a `relief_valve` of that setting. Current against
     pressure, the highest setting and the lag of the solenoid stand before it: `table`, `limiter`,
@@ -35,13 +35,13 @@ class ProportionalReliefValve(Lagging, Metering, Component):
 
     a = takes_pressure("inlet")
     b = takes_pressure("outlet")
-    setting = takes_signal(Pressure, "drop at which the valve starts to open")
+    setting = takes_signal(Pressure, "drop at which the valve starts to open", low=0)
     lift = state(Ratio, "share of the full opening", start=0.0, nominal=1.0)
     q = observable(Flow, "flow from a to b")
     loss = dissipates()
 
     def equations(self, p_a: Expr, p_b: Expr, setting: Expr, lift: Expr, at: Expr, fluid: Fluid) -> Equations:
-        target = (p_a - p_b - maximum(setting, 0.0)) / self.opening_range
+        target = (p_a - p_b - setting) / self.opening_range
         q = self.metered(p_a, p_b, lift, fluid)
         return {"q_a": q, "q_b": -q, "q": q, **self.lag("lift", lift, at, target)}
 

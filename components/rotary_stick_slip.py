@@ -85,14 +85,14 @@ class FrictionBrake(_Rubbing, Component):
               \omega = 0 \text{ while } \left|\sum T\right| \le a T_s
 
     J = `inertia` [kg m^2]; \varphi [rad], never wrapped, \omega [rad/s]; T [N m] on the rotor; a = `application` [-], a
-    signal, 0 released, 1 fully applied, more where the pads are pressed harder, taken as 0 below; T_c =
+    signal, 0 released, 1 fully applied, more where the pads are pressed harder; T_c =
     `coulomb_friction`, T_s = `static_friction` [N m] at a = 1. Sticking and breaking away are events, as in
     `stick_slip_inertia`. Its angle counts up, as that of `inertia`. Energy: J \omega^2/2 [J]; a T_c |\omega| [W] is
     lost. Not for a clutch between two rotors, nor for fading with heat. Source: Coulomb's law of friction; Karnopp, J.
     Dyn. Syst. Meas. Control 107 (1985) 100-103, with the zero-velocity band replaced by an event.
     """
 
-    application = takes_signal(Ratio, "share of the full friction torque, 0 released")
+    application = takes_signal(Ratio, "share of the full friction torque, 0 released", low=0)
     shaft = gives_rotation("the rotor")
     phi = state(Angle, "angle", start=0.0, nominal=1.0, counts=True)
     omega = state(Speed, "speed", start=0.0, nominal=1.0)
@@ -103,4 +103,4 @@ class FrictionBrake(_Rubbing, Component):
     loss = dissipates()
 
     def equations(self, phi: Expr, omega: Expr, direction: Expr, torque_shaft: Expr, application: Expr) -> Equations:
-        return self._law(phi, omega, direction, torque_shaft, maximum(application, 0.0))
+        return self._law(phi, omega, direction, torque_shaft, application)

@@ -55,10 +55,10 @@ class FlowSensor(Component):
 
     .. math:: p_b = p_a, \quad y = q_a = -q_b
 
-    p [Pa]; q [m^3/s] positive into the sensor, so y is the flow from a to b. Port a belongs to the side whose
-    pressure is given (a volume, a tank, a source), port b to a net without a giver of its own. It has no volume
-    and no resistance. Not for a place between two volumes: they need a resistance between them, whose `q` is
-    the flow. Source: ideal sensor.
+    p [Pa]; q [m^3/s] positive into the sensor, mass flow over \rho_0, so y is the flow from a to b as volume at 0 bar
+    gauge. Port a belongs to the side whose pressure is given (a volume, a tank, a source), port b to a net without a
+    giver of its own. It has no volume and no resistance. Not for a place between two volumes: they need a resistance
+    between them, whose `q` is the flow. Source: ideal sensor.
     """
 
     lossless: ClassVar[bool] = True

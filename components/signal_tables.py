@@ -66,10 +66,10 @@ class TimeTable(Component):
         """What `check` says of a run until ``stop`` [s]."""
         return extended("the table", self.curve.x, self.beyond, stop)
 
-    def equations(self, t: Expr, piece: Expr | None = None) -> Equations:
+    def equations(self, t: Expr, piece: Any = None) -> Equations:
         if piece is None:  # a number's own piece
-            schedule = self.schedule(float(t), float(t))  # type: ignore[arg-type]
-            piece = schedule.rows[schedule.at(float(t))]  # type: ignore[arg-type]
+            schedule = self.schedule(float(t), float(t))
+            piece = schedule.rows[schedule.at(float(t))]
         return {"y": on_piece(t, piece, 0, self.degree)}
 
 
@@ -126,7 +126,7 @@ class Table(Component):
         x = self.curve.x
         return pieces(x, np.array(self.curve.y), self.interpolation, beyond, (x[0], x[0]))
 
-    def equations(self, u: Expr, turns: Expr | None = None, begun: Expr | None = None) -> Equations:
+    def equations(self, u: Expr, turns: Any = None, begun: Any = None) -> Equations:
         first, last = self.curve.x[0], self.curve.x[-1]
         lines = self.interpolation == "linear"
         if self.beyond == "repeat":

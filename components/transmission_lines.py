@@ -17,6 +17,7 @@ from .flow_laws import friction_times_reynolds
 from .frequency_friction import MOST_TERMS, WEIGHTS, lag_step, shear, terms_of, unit_lag
 from .line_walls import LineWall
 from .two_ports import line_series, two_port_of
+from .vapour_cavities import CavityEnd, cavity_end, cavity_events
 
 
 def _start_waves(line: "TransmissionLine", fluid: Fluid | None, way: int) -> np.ndarray:
@@ -92,12 +93,16 @@ class TransmissionLine(LineWall, Component):
     between ticks they are parabolas that keep the mean, so the fluid in the line changes by what its ends take in,
     exactly. Fronts stay sharp to a tick; waves of less than 7 ticks per period may be taken for fronts. An end that
     gives its pressure answers flow at once, p = w + Z q, so between it and an orifice must stand a volume.
+    Such an end opens a vapour cavity, of volume `cavity_a` or `cavity_b` [m^3], rather than fall below the vapour
+    pressure; in fluid without vapour the run ends at absolute zero. A front takes a tick, so the volume is known to a
+    few ticks of flow: more `lumps` make it finer. An end that takes its pressure leaves cavities to the volume there.
     It keeps no books of energy: of what passes an end between two ticks only the fluid is summed up, and waves of one
     density and impedance carry p q, not the power of a fluid that can be compressed.
-    Not for aerated oil over a wide range of pressures, whose wave speed varies (`lax_wendroff_line`), nor for unsteady
-    friction of turbulent flow.
-    Source: Wylie & Streeter, Fluid Transients in Systems (1993), chapter 3 and section 3-4; P. Krus, K. Weddfelt,
-    J.-O. Palmberg, J. Dyn. Sys. Meas. Control 116 (1994) 132-136; Zielke (1968); Kagawa et al. (1983).
+    Not for cavities inside the line, away from its ends (`distributed_line`), for aerated oil over a wide range of
+    pressures, whose wave speed varies (`lax_wendroff_line`), nor for unsteady friction of turbulent flow.
+    Source: Wylie & Streeter, Fluid Transients in Systems (1993), chapter 3, section 3-4, and on column separation;
+    P. Krus, K. Weddfelt, J.-O. Palmberg, J. Dyn. Sys. Meas. Control 116 (1994) 132-136; Zielke (1968); Kagawa et al.
+    (1983).
     """
 
     family: ClassVar[bool] = True
@@ -180,6 +185,17 @@ class TransmissionLine(LineWall, Component):
         viscous = friction_times_reynolds(v * d / nu, self.roughness / d) * nu * self.length / (2 * d * d)
         return (viscous + self.loss_coefficient * v / 2) * fluid.rho_0 / (self.area * self.lumps)
 
+    def at_rest(self, fluid: Fluid) -> Any:
+        """Density over that at 0 bar gauge [-]."""
+        p: Any = self.mean_pressure
+        return fluid.density(p) / fluid.rho_0
+
+    def with_cavity(self, end: str, at: CavityEnd, volume: Expr, is_open: Expr, fluid: Fluid) -> Equations:
+        """How the cavity of an end grows, opens and closes."""
+        bore = self.area * self.length
+        growth = {f"der_cavity_{end}": at.growth / self.at_rest(fluid)}
+        return growth | cavity_events(end, volume, is_open, bore, fluid)
+
     def lump_drops(self, begin: Expr, end: Expr, before: "Losses", fluid: Fluid) -> tuple[Any, "Losses"]:
         r"""Losses of the lumps [Pa] when the tick began, and all of them when it ended, from those of the tick before.
 
@@ -208,12 +224,12 @@ class TransmissionLine(LineWall, Component):
         return begin - twice * at_begin, Losses(found, end - twice * found, q_lag)
 
     def stepped(
-        self, to_b: Waves, to_a: Waves, losses: "Losses", books: "Books", q_a: Expr, q_b: Expr, t: Expr, fluid: Fluid
+        self, to_b: Waves, to_a: Waves, losses: "Losses", books: "Books", q_a: Any, q_b: Any, t: Expr, fluid: Fluid
     ) -> Equations:
-        """What all forms share: the fluid taken in, and how the waves step on."""
+        """What all forms share, from the flows into the line: the fluid taken in, and how the waves step on."""
         p: Any = self.mean_pressure
         Z, dt, area = self.impedance(fluid), self.tick(fluid), self.area
-        soft = fluid.density(p) / fluid.rho_0 * self.softness(p, self.diameter, fluid)
+        soft = self.at_rest(fluid) * self.softness(p, self.diameter, fluid)
         taken_a, taken_b = books.into_a - books.had_a, books.into_b - books.had_b
         from_a, from_b = to_b[:-1], to_a[1:]
         begin, end = (from_a.begin - from_b.begin)[::2], (from_a.end - from_b.end)[::2]
@@ -225,7 +241,7 @@ class TransmissionLine(LineWall, Component):
         next_b = joined(without_overshoot(left_a, to_b[0]), from_a.shifted(*gain))
         next_a = joined(from_b.shifted(*loss), without_overshoot(left_b, to_a[-1]))
         pressure = total(to_a.mean + to_b.mean) / (2 * self.cells)
-        at_mean = fluid.density(p) / fluid.rho_0 * self.swelling(p, self.diameter)
+        at_mean = self.at_rest(fluid) * self.swelling(p, self.diameter)
         return {
             "der_into_a": q_a,
             "der_into_b": q_b,
@@ -280,19 +296,24 @@ class TransmissionLineTakesGives(TransmissionLine):
 
     a = takes_pressure("first end")
     b = gives_pressure("second end")
+    cavity_b = state(Volume, "vapour cavity at b", nominal=1e-8, counts=True)
+    open_b = held(Ratio, "1 while the cavity at b is open", counts=True)
 
     def equations(
         self, b_begin: Expr, b_end: Expr, b_mean: Expr, a_begin: Expr, a_end: Expr, a_mean: Expr, sent_a: Expr,
         sent_b: Expr, q_lump: Expr, drop: Expr, q_lag: Expr, t_node: Expr, into_a: Expr, into_b: Expr, had_a: Expr,
-        had_b: Expr, p_a: Expr, q_b: Expr, t: Expr, fluid: Fluid,
+        had_b: Expr, cavity_b: Expr, open_b: Expr, p_a: Expr, q_b: Expr, t: Expr, fluid: Fluid,
     ) -> Equations:  # fmt: skip
         to_b, to_a = Waves(b_begin, b_end, b_mean), Waves(a_begin, a_end, a_mean)
         share, Z = (t - t_node) / self.tick(fluid), self.impedance(fluid)
         q_a = (p_a - to_a[0].at(share)) / Z
-        p_b = to_b[-1].at(share) + Z * q_b
+        at_b = cavity_end(to_b[-1].at(share), Z, q_b, open_b, fluid)
         books = Books(into_a, into_b, had_a, had_b, sent_a, sent_b)
         losses = Losses(q_lump, drop, q_lag)
-        return {"q_a": q_a, "p_b": p_b} | self.stepped(to_b, to_a, losses, books, q_a, q_b, t, fluid)
+        shared = self.stepped(to_b, to_a, losses, books, q_a, at_b.q, t, fluid)
+        shared |= self.with_cavity("b", at_b, cavity_b, open_b, fluid)
+        shared["content"] -= self.at_rest(fluid) * cavity_b
+        return {"q_a": q_a, "p_b": at_b.p} | shared
 
 
 class TransmissionLineGivesTakes(TransmissionLine):
@@ -305,19 +326,24 @@ class TransmissionLineGivesTakes(TransmissionLine):
 
     a = gives_pressure("first end")
     b = takes_pressure("second end")
+    cavity_a = state(Volume, "vapour cavity at a", nominal=1e-8, counts=True)
+    open_a = held(Ratio, "1 while the cavity at a is open", counts=True)
 
     def equations(
         self, b_begin: Expr, b_end: Expr, b_mean: Expr, a_begin: Expr, a_end: Expr, a_mean: Expr, sent_a: Expr,
         sent_b: Expr, q_lump: Expr, drop: Expr, q_lag: Expr, t_node: Expr, into_a: Expr, into_b: Expr, had_a: Expr,
-        had_b: Expr, q_a: Expr, p_b: Expr, t: Expr, fluid: Fluid,
+        had_b: Expr, cavity_a: Expr, open_a: Expr, q_a: Expr, p_b: Expr, t: Expr, fluid: Fluid,
     ) -> Equations:  # fmt: skip
         to_b, to_a = Waves(b_begin, b_end, b_mean), Waves(a_begin, a_end, a_mean)
         share, Z = (t - t_node) / self.tick(fluid), self.impedance(fluid)
-        p_a = to_a[0].at(share) + Z * q_a
+        at_a = cavity_end(to_a[0].at(share), Z, q_a, open_a, fluid)
         q_b = (p_b - to_b[-1].at(share)) / Z
         books = Books(into_a, into_b, had_a, had_b, sent_a, sent_b)
         losses = Losses(q_lump, drop, q_lag)
-        return {"p_a": p_a, "q_b": q_b} | self.stepped(to_b, to_a, losses, books, q_a, q_b, t, fluid)
+        shared = self.stepped(to_b, to_a, losses, books, at_a.q, q_b, t, fluid)
+        shared |= self.with_cavity("a", at_a, cavity_a, open_a, fluid)
+        shared["content"] -= self.at_rest(fluid) * cavity_a
+        return {"p_a": at_a.p, "q_b": q_b} | shared
 
 
 class TransmissionLineGivesGives(TransmissionLine):
@@ -330,16 +356,25 @@ class TransmissionLineGivesGives(TransmissionLine):
 
     a = gives_pressure("first end")
     b = gives_pressure("second end")
+    cavity_a = state(Volume, "vapour cavity at a", nominal=1e-8, counts=True)
+    open_a = held(Ratio, "1 while the cavity at a is open", counts=True)
+    cavity_b = state(Volume, "vapour cavity at b", nominal=1e-8, counts=True)
+    open_b = held(Ratio, "1 while the cavity at b is open", counts=True)
 
     def equations(
         self, b_begin: Expr, b_end: Expr, b_mean: Expr, a_begin: Expr, a_end: Expr, a_mean: Expr, sent_a: Expr,
         sent_b: Expr, q_lump: Expr, drop: Expr, q_lag: Expr, t_node: Expr, into_a: Expr, into_b: Expr, had_a: Expr,
-        had_b: Expr, q_a: Expr, q_b: Expr, t: Expr, fluid: Fluid,
+        had_b: Expr, cavity_a: Expr, open_a: Expr, cavity_b: Expr, open_b: Expr, q_a: Expr, q_b: Expr, t: Expr,
+        fluid: Fluid,
     ) -> Equations:  # fmt: skip
         to_b, to_a = Waves(b_begin, b_end, b_mean), Waves(a_begin, a_end, a_mean)
         share, Z = (t - t_node) / self.tick(fluid), self.impedance(fluid)
-        p_a = to_a[0].at(share) + Z * q_a
-        p_b = to_b[-1].at(share) + Z * q_b
+        at_a = cavity_end(to_a[0].at(share), Z, q_a, open_a, fluid)
+        at_b = cavity_end(to_b[-1].at(share), Z, q_b, open_b, fluid)
         books = Books(into_a, into_b, had_a, had_b, sent_a, sent_b)
         losses = Losses(q_lump, drop, q_lag)
-        return {"p_a": p_a, "p_b": p_b} | self.stepped(to_b, to_a, losses, books, q_a, q_b, t, fluid)
+        shared = self.stepped(to_b, to_a, losses, books, at_a.q, at_b.q, t, fluid)
+        shared |= self.with_cavity("a", at_a, cavity_a, open_a, fluid)
+        shared |= self.with_cavity("b", at_b, cavity_b, open_b, fluid)
+        shared["content"] -= self.at_rest(fluid) * (cavity_a + cavity_b)
+        return {"p_a": at_a.p, "p_b": at_b.p} | shared

@@ -153,7 +153,7 @@ def edge_share(stroke: Any, overlap: Any, rounding: Any) -> Any:
 
     u = `overlap`, w = `rounding` > 0, both as shares of the stroke; s is 1 at full stroke, x = 1.
     """
-    return _rounded(clipped(stroke, -1.0) - overlap, rounding) / (1 - overlap)
+    return _rounded(stroke - overlap, rounding) / (1 - overlap)
 
 
 def middle_share(stroke: Any, closed: Any, rounding: Any) -> Any:
@@ -164,8 +164,7 @@ def middle_share(stroke: Any, closed: Any, rounding: Any) -> Any:
     c = `closed`; both corners, in the middle and at c, are rounded within w = `rounding` > 0 as in :func:`edge_share`,
     which takes w/2 off the peak: s is 1 in the middle. All as shares of the stroke.
     """
-    x = clipped(stroke, -1.0)
-    away = _rounded(x, rounding) + _rounded(-x, rounding)
+    away = _rounded(stroke, rounding) + _rounded(-stroke, rounding)
     return _rounded(closed - away, rounding) / _rounded(closed - rounding / 2, rounding)
 
 

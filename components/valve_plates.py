@@ -107,7 +107,7 @@ class VariableSwashPlateBarrel(Component):
 
     shaft = takes_rotation("the barrel")
     chambers = gives_chamber("chambers of the pistons", size="pistons")
-    setting = takes_signal(Ratio, "share of the largest displacement, -1 to 1")
+    setting = takes_signal(Ratio, "share of the largest displacement", low=-1, high=1)
     share = state(Ratio, "share of the largest displacement", start="start_setting", nominal=1.0)
     torque = observable(Torque, "torque of the shaft on the barrel, positive while pumping")
     displacement = observable(Displacement, "volume displaced per shaft angle")
@@ -117,7 +117,7 @@ class VariableSwashPlateBarrel(Component):
         angles = piston_angles(phi_shaft, self.start_angle, self.pistons)
         area = pi / 4 * self.piston_diameter * self.piston_diameter
         half_stroke_volume = area * self.pitch_radius * tan(self.largest_swash_angle)
-        moves = (minimum(maximum(setting, -1.0), 1.0) - share) / self.lag
+        moves = (setting - share) / self.lag
         rates = -half_stroke_volume * share * sin(angles)
         torque = -total(p_chambers * rates)
         swivelling = half_stroke_volume * moves * cos(angles)

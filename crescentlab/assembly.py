@@ -22,6 +22,7 @@ from crescentlab.energy import passes_fluid
 from crescentlab.errors import ExpressionError, InputError, nearest
 from crescentlab.expressions import Value, evaluate
 from crescentlab.prepared import shared
+from crescentlab.pressures import GivenPressure, absolute_zeros, given_pressures, own_pressures
 from crescentlab.symbols import Condition, Relation, Sym, column
 from crescentlab.system import Bits, System, SystemEvent, Variable
 from crescentlab.time_alone import NAME as TIME_ALONE
@@ -143,13 +144,18 @@ class _Assembly:
         if self.plan.design.outputs:
             self.variables()  # a wrong output is told before the run
         extra = self.stop(events, conditions, relations, scales)
-        relations += timed.relations
-        scales += timed.scales
-        b = ca.vertcat(self.b, extra, *timed.bits)
-        together = shared(ca.densify(column([derivative, *relations])))
-        f, g = ca.vertsplit(together, [0, derivative.numel(), together.numel()])
         state_names, state_quantities = self.names(State)
         held_names, held_quantities = self.names(Held)
+        given = self.given(
+            own_pressures(self.plan, state_names, state_quantities),
+            own_pressures(self.plan, held_names, held_quantities),
+        )
+        floors = self.floors(given, events, conditions, relations, scales)
+        relations += timed.relations
+        scales += timed.scales
+        b = ca.vertcat(self.b, extra, floors, *timed.bits)
+        together = shared(ca.densify(column([derivative, *relations])))
+        f, g = ca.vertsplit(together, [0, derivative.numel(), together.numel()])
         return System(
             plan=self.plan,
             output_parameters=tuple(self.used),
@@ -172,7 +178,8 @@ class _Assembly:
             held_quantities=held_quantities,
             counting_states=self.counting(State),
             counting_held=self.counting(Held),
-            bits=self.bits(g, b, timed),
+            bits=self.bits(g, b, floors.numel(), timed),
+            given=given,
             _variables=self.variables,
             remapping=self.remap,
             reading=self.reading,
@@ -278,24 +285,60 @@ class _Assembly:
             relations[:], conditions[:] = rest[: len(relations)], rest[len(relations) :]
         return derivative, timed
 
-    def bits(self, g: ca.SX, b: ca.SX, on_time: TimeAlone) -> Bits:
+    def given(self, *own: list[tuple[int, str]]) -> tuple[GivenPressure, ...]:
+        """Pressures that ports give and that are none of the ``own`` ones of states and held values."""
+        nets = [net for net in self.plan.graph.nets if net.domain is HYDRAULIC]
+        pressures = [p for net in nets for p in self.across([self.plan.givers[net.name]], 0)]
+        symbols = [vector[k] for vector, found in zip((self.x, self.h), own, strict=True) for k, _ in found]
+        names = [n for fluid in self.plan.design.fluids.values() for n in numeric_fields(type(fluid), fluid)]
+        names += [name for trace in self.plan.traces.values() for name in trace.parameters]
+        return given_pressures(self.plan, pressures, column(symbols), self.p, names)
+
+    def floors(
+        self, given: Sequence[GivenPressure], events: list[SystemEvent], conditions: list[ca.SX],
+        relations: list[ca.SX], scales: list[ca.SX],
+    ) -> ca.SX:  # fmt: skip
+        """Append what ends the run where a given pressure passes absolute zero; return the bits of its relations."""
+        fluids = self.plan.design.fluids
+        kept = [each for each in given if each.moving and not (each.fluid and fluids[each.fluid].tension)]
+        if not kept:
+            return ca.SX(0, 1)
+        pressures = column([each.expression for each in kept])
+        lowest = absolute_zeros(self.plan, self.p, [each.fluid for each in kept])
+        bits = ca.SX.sym("floor", len(kept))
+        relations.append(pressures - lowest)
+        scales.append(ca.fabs(pressures) - lowest)
+        conditions.append(1 - bits)
+        events += [
+            SystemEvent(f"{each.owner}.absolute_zero_{k + 1}", "fail", each.failure, (each.variable,))
+            for k, each in enumerate(kept)
+        ]
+        return bits
+
+    def bits(self, g: ca.SX, b: ca.SX, floors: int, on_time: TimeAlone) -> Bits:
         n = g.numel()
         names = [f"{name}: {info.text}" for name, tr in self.plan.traces.items() for info in tr.relations]
         strict = [info.strict for tr in self.plan.traces.values() for info in tr.relations]
         extra = getattr(self, "stop_strict", [])
         names += ["stop_when"] * len(extra)
+        names += [f"absolute zero {k + 1}" for k in range(floors)]
         names += [TIME_ALONE] * len(on_time.bits)
-        strict += extra + on_time.strict
+        strict += extra + [False] * floors + on_time.strict
         switches = [info.switches for tr in self.plan.traces.values() for info in tr.relations]
-        switches += [False] * (len(extra) + len(on_time.bits))
+        first = len(switches) + len(extra)
+        switches += [False] * (len(extra) + floors + len(on_time.bits))
         on_state = _depends(g, self.x) if n else np.zeros(0, bool)
         timed = (_depends(g, self.t) if n else np.zeros(0, bool)) & ~on_state
         curved = np.array(ca.which_depends(g, self.t, 2, True), bool) if n and timed.any() else np.zeros(n, bool)
         curved[n - len(on_time.bits) :] = ~np.array(on_time.straight, bool)
         held = _depends(g, ca.vertcat(self.h, b)) if n else np.zeros(0, bool)
+        floor = np.isin(np.arange(n), range(first, first + floors))
+        stepwise = floor & timed & curved & held  # sought in every step; a scan ahead would be due at every tick
+        on_state, timed, curved = on_state | stepwise, timed & ~stepwise, curved & ~stepwise
         return Bits(
-            tuple(names), np.array(strict, bool), on_state, timed, timed & ~curved, held, np.array(switches, bool)
-        )
+            tuple(names), np.array(strict, bool), on_state, timed, timed & ~curved, held, np.array(switches, bool),
+            floor,
+        )  # fmt: skip
 
     def remap(self, may_fire: list[bool]) -> tuple[ca.SX, list[ca.SX]]:
         """Flags of fired events, and the states and held values after them; composed in the order written.
@@ -303,7 +346,7 @@ class _Assembly:
         Events that cannot fire are left out.
         """
         flags = self.layout(lambda trace: len(trace.events))
-        fired = ca.SX.sym("fired", flags.size + (1 if hasattr(self, "stop_strict") else 0))
+        fired = ca.SX.sym("fired", len(may_fire))
         x, h = ca.SX(self.x), ca.SX(self.h)
         for first, names in self.alike.items():
             trace = self.plan.traces[first]

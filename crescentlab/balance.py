@@ -31,6 +31,8 @@ from crescentlab.system import System, Values
 from crescentlab.units import QUANTITIES
 
 Array = np.ndarray
+Number = float | None
+"""An entry; None where it is not determined, for a rate of it is no finite number."""
 
 UNEQUAL = 1e-9
 """Share of the flow through a component that keeps nothing by which entering and leaving may differ: rounding."""
@@ -44,17 +46,17 @@ AT_REST = 1e-6
 class EnergyBalance:
     """Relative errors per component that keeps books of energy and for the circuit, and where the energy went [J]."""
 
-    components: dict[str, float]
-    circuit: float
-    supplied: dict[str, float]
+    components: dict[str, Number]
+    circuit: Number
+    supplied: dict[str, Number]
     """From outside the circuit, per source or boundary; negative where energy left it there."""
-    dissipated: dict[str, float]
+    dissipated: dict[str, Number]
     """Turned into heat, per component that did so."""
-    stored: float
+    stored: Number
     """Change of what is stored."""
-    at_events: dict[str, float]
+    at_events: dict[str, Number]
     """Gained by jumps at events, negative where an impact lost it; part of ``stored``."""
-    silent: dict[str, float]
+    silent: dict[str, Number]
     """What entered components that do not say what becomes of it."""
 
     def as_json(self) -> dict[str, object]:
@@ -74,9 +76,9 @@ class EnergyBalance:
 class Balance:
     """Relative errors per storing component and for the circuit, content moved by events [m^3], and the energies."""
 
-    components: dict[str, float]
-    circuit: float
-    merged: dict[str, float]
+    components: dict[str, Number]
+    circuit: Number
+    merged: dict[str, Number]
     unequal: dict[str, float]
     """What entered more than left components that keep nothing [m^3]: their equations are wrong."""
     energy: EnergyBalance | None
@@ -111,7 +113,25 @@ def balance(system: System, values: Values, trajectory: Trajectory) -> Balance |
     cold = [name for name, heat, p in zip(energies, lost, most, strict=True) if heat < -COLD * p]
     books = _kept(system, list(energies), left, most, lost, supplied, energy_change)
     errors = _errors(list(contents), net - fluid_change.smooth, size, fluid_change)
-    return Balance(*errors, _by_name(contents, fluid_change.moved), unequal, books, _told(unequal, cold))
+    lost_track = _not_determined("fluid", contents, {"flow": net, "content": fluid_change.total})
+    entries = {"heat": lost, "supply": supplied, "power": left, "stored energy": energy_change.total}
+    lost_track += _not_determined("energy", energies, entries)
+    told = [*_told(unequal, cold), *lost_track]
+    return Balance(*errors, _by_name(contents, fluid_change.moved), unequal, books, told)
+
+
+def _not_determined(ledger: str, names: Iterable[str], entries: dict[str, Array]) -> list[str]:
+    """Which entries of a ledger are no finite numbers, in one sentence."""
+    found = [
+        f"the {entry} of {name}"
+        for k, name in enumerate(names)
+        for entry, numbers in entries.items()
+        if not np.isfinite(numbers[k])
+    ]
+    if not found:
+        return []
+    more = f" and {len(found) - 1} more" if len(found) > 1 else ""
+    return [f"the ledger of {ledger} is not determined: {found[0]} is not a finite number{more}"]
 
 
 def _told(unequal: dict[str, float], cold: list[str]) -> list[str]:
@@ -130,14 +150,14 @@ def _kept(
 ) -> EnergyBalance | None:
     """The ledger of energy; None if no component keeps books."""
     silent = set(system.silent())
-    entered = {name: float(each) for name, each in zip(names, left, strict=True) if name in silent}
+    entered = {name: each for name, each in _by_name(names, left).items() if name in silent}
     if len(entered) == len(names):
         return None
     missing = np.where([name in silent for name in names], 0.0, left - change.smooth)
     errors, circuit = _errors(names, missing, most, change)
     return EnergyBalance(
         {name: error for name, error in errors.items() if name not in silent}, circuit, _nonzero(names, supplied),
-        _nonzero(names, lost), float(change.total.sum()), _nonzero(names, change.at_events), entered,
+        _nonzero(names, lost), _number(change.total.sum()), _nonzero(names, change.at_events), entered,
     )  # fmt: skip
 
 
@@ -203,15 +223,20 @@ def _columns(system: System, name: str, columns: list[ca.SX]) -> Columns:
     return found
 
 
-def _errors(names: list[str], missing: Array, passing: Array, change: _Change) -> tuple[dict[str, float], float]:
+def _errors(names: list[str], missing: Array, passing: Array, change: _Change) -> tuple[dict[str, Number], Number]:
     """Errors per component and of the circuit, as shares of the most that passed through any component."""
-    unit = max(float(passing.max(initial=0)), AT_REST * float(change.largest.max(initial=0)), 1e-300)
-    return _by_name(names, np.abs(missing) / unit), float(abs(missing.sum()) / unit)
+    known, stored = passing[np.isfinite(passing)], change.largest[np.isfinite(change.largest)]
+    unit = max(float(known.max(initial=0)), AT_REST * float(stored.max(initial=0)), 1e-300)
+    return _by_name(names, np.abs(missing) / unit), _number(abs(missing.sum()) / unit)
 
 
-def _nonzero(names: Iterable[str], numbers: Array) -> dict[str, float]:
-    return {name: number for name, number in _by_name(names, numbers).items() if number}
+def _nonzero(names: Iterable[str], numbers: Array) -> dict[str, Number]:
+    return {name: number for name, number in _by_name(names, numbers).items() if number != 0}
 
 
-def _by_name(names: Iterable[str], numbers: Array) -> dict[str, float]:
-    return {name: float(number) for name, number in zip(names, numbers, strict=True)}
+def _by_name(names: Iterable[str], numbers: Array) -> dict[str, Number]:
+    return {name: _number(number) for name, number in zip(names, numbers, strict=True)}
+
+
+def _number(value: float) -> Number:
+    return float(value) if np.isfinite(value) else None

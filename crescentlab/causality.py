@@ -22,7 +22,9 @@ from crescentlab.errors import CausalityError, ComponentError, InputError, neare
 from crescentlab.fluid import Fluid
 from crescentlab.graph import Graph, Member, Net
 from crescentlab.library import Library
+from crescentlab.netlist import FLUID
 from crescentlab.trace import Trace, structure_of, trace
+from crescentlab.units import Quantity, parse_any
 
 Variable = tuple[str, int]
 """An instance's port output: instance name, place in its trace's output layout."""
@@ -139,7 +141,8 @@ def _giver(graph: Graph, net: Net, components: dict[str, Component], allow_open:
     if len(givers) > 1:
         names = " and ".join(str(m) for m in givers)
         advice = (
-            "insert a restriction between them, for example {type: orifice, area: 10 mm^2}"
+            "insert a restriction between them, for example {type: orifice, area: 10 mm^2}, with a net for each of its "
+            "ports a and b"
             if net.domain is HYDRAULIC
             else "keep one of them"
         )
@@ -152,7 +155,15 @@ def _giver(graph: Graph, net: Net, components: dict[str, Component], allow_open:
         if net.domain is HYDRAULIC
         else f"nothing gives the {word} of {names}: insert"
     )
-    raise CausalityError(f"net {net.name}: {meet} {net.domain.giver}", net.source.place)
+    source = f"{net.domain.giver}{_constant(graph.quantity(net.members[0]))}" if net.domain is SIGNAL else None
+    raise CausalityError(f"net {net.name}: {meet} {source or net.domain.giver}", net.source.place)
+
+
+def _constant(quantity: Quantity) -> str:
+    """A source of a signal of this quantity, as it is written."""
+    value = quantity.example()
+    named = "" if parse_any(value)[1] is quantity else f"output_quantity: {quantity.name}, "
+    return f", for example {{type: constant, {named}value: {value}}}, its y on this net"
 
 
 # -- fluids --------------------------------------------------------------------------------------
@@ -185,8 +196,7 @@ def _fluids(graph: Graph, components: dict[str, Component], library: Library) ->
             elif argument in fluids_asked(type(component)):
                 if not design.fluids:
                     raise InputError(
-                        "the circuit names no fluid; write for example fluid: {type: simple_oil, density: 860 kg/m^3, "
-                        "kinematic_viscosity: 35 cSt, bulk_modulus: 14000 bar}",
+                        f"the circuit names no fluid; write for example fluid: {FLUID}",
                         design.instances[name].place,
                     )
                 raise InputError(

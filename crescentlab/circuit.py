@@ -6,6 +6,7 @@ trajectory -> result. A change of parameter values reuses the assembled system.
 
 from __future__ import annotations
 
+import importlib
 import time
 from collections.abc import Callable
 from dataclasses import replace
@@ -13,7 +14,7 @@ from importlib import resources
 from pathlib import Path
 from typing import Any, get_args
 
-from crescentlab import arguments
+from crescentlab import arguments, cold_start
 from crescentlab.arguments import Settings
 from crescentlab.assembly import assemble
 from crescentlab.causality import Plan, plan
@@ -29,6 +30,7 @@ from crescentlab.plotting import check_plots
 from crescentlab.recorded import Recorded, read
 from crescentlab.result import Result
 from crescentlab.solvers.options import Options
+from crescentlab.solvers.ranges import beyond_ranges
 from crescentlab.solvers.snapshot import Snapshot
 from crescentlab.system import System
 from crescentlab.trace import structure_of
@@ -39,6 +41,10 @@ Start = Result | Snapshot | str | Path
 """What a run can go on from: another run, where it stood, or its file."""
 SOLVERS: tuple[str, ...] = get_args(SimulationSection.model_fields["solver"].annotation)
 """Names of ``--solver`` and ``solver:``."""
+STEADY = "steady"
+"""The start that is an operating point."""
+OPERATING_POINT = "crescentlab.analysis.steady"
+"""Home of the search for it. It works on circuits, so that it stands above this module and is called by its name."""
 DESIGNS = 32
 """Designs kept: an analysis asks for the same one several times."""
 MAX_ROWS = 10_000_000
@@ -176,8 +182,9 @@ class Circuit:
     ) -> Result:  # fmt: skip
         """Integrate the circuit; text needs units, floats are SI. ``compile`` as for ``--compile``.
 
-        With ``start``, a result or its file, the run goes on from its end, to the time ``stop``. With ``verify`` it is
-        run again at a tenth of its tolerance, with steps at most half as long as the first run's longest may be, and
+        With ``start``, a result or its file, the run goes on from its end, to the time ``stop``; with
+        ``start="steady"`` it begins at the operating point, as with ``simulation: {start: steady}``. With ``verify`` it
+        is run again at a tenth of its tolerance, with steps at most half as long as the first run's longest may be, and
         ``result.verification`` tells how far the two are apart; where they do not agree, a warning says so.
 
         Raises :class:`InputError` for wrong input, and, with ``check``, :class:`SimulationError` if the run
@@ -195,13 +202,23 @@ class Circuit:
         )  # fmt: skip
         check_options(options)
         values = system.values(design)
-        begin = None if start is None else snapshot_of(start, system)
+        start = section.start if start is None else start
+        warnings: list[str] = []
+        begin: Snapshot | None
+        if isinstance(start, str) and start == STEADY:
+            begin, warnings = self._at_rest(parameters)
+        else:
+            begin = None if start is None else snapshot_of(start, system)
         if begin is not None and not options.stop > begin.t:
             raise InputError(f"stop: the start is at {begin.t:g} s already; write an end time beyond it")
         from crescentlab.solvers.integrate import integrate  # a third of a second of SciPy that `check` does without
 
         trajectory = integrate(system, values, options, progress, begin)
+        trajectory.warnings[:0] = warnings
+        trajectory.warnings += beyond_ranges(system, values.p, trajectory.steps)
         result = Result(system, values if begin is None else begin.values(values), design, trajectory)
+        if trajectory.status == "failed" and begin is None:
+            trajectory.error += cold_start.advice(result, options.span)
         if verify:
             tighter = max(TIGHTER * options.rtol, SMALLEST_RTOL)
             half = replace(options, rtol=tighter, max_step=options.step_cap / 2)  # else capped steps would be the same
@@ -215,6 +232,18 @@ class Circuit:
         if check and trajectory.status == "interrupted":
             raise KeyboardInterrupt(trajectory.error)
         return result
+
+    def _at_rest(self, parameters: Settings | None) -> tuple[Snapshot, list[str]]:
+        """The operating point at the time 0, and what is to be said of it."""
+        steady = importlib.import_module(OPERATING_POINT).steady
+        place = self.netlist.place("simulation", "start")
+        try:
+            point = steady(self, parameters, at=0.0)
+        except InputError as error:
+            raise error.at(place) from None
+        except SimulationError as error:
+            raise SimulationError(f"start: steady: {error}") from None
+        return point.snapshot, [f"start: {said}" for said in point.warnings]
 
 
 def check_circuit(circuit: Any, name: str) -> None:

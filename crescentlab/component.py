@@ -70,6 +70,8 @@ class Component(BaseModel):
     @classmethod
     def __pydantic_init_subclass__(cls, **kwargs: Any) -> None:
         _check_class(cls)
+        if any(port.ranged for port in cls.ports()) and not (cls.family or hasattr(cls.equations, "holds_ranges")):
+            cls.equations = _holding_ranges(cls.equations)
 
     lossless: ClassVar[bool] = False
     """Whether all the power that enters leaves at once, as through a lever, a pair of gears or a meter."""
@@ -167,6 +169,22 @@ def _together(one: type, other: type) -> bool:
     home, away = one.__module__, other.__module__
     package = home.rpartition(".")[0]
     return home == away or (bool(package) and package == away.rpartition(".")[0])
+
+
+def _holding_ranges(equations: Callable[..., Equations]) -> Callable[..., Equations]:
+    """The same equations; the signals they are given are held within the ranges that the ports declare."""
+    signature = inspect.signature(equations)
+
+    @functools.wraps(equations)
+    def held(self: Component, *args: Any, **kwargs: Any) -> Equations:
+        given = signature.bind(self, *args, **kwargs)
+        for port in self.ports():
+            if port.ranged and port.name in given.arguments:
+                given.arguments[port.name] = port.within(given.arguments[port.name])
+        return equations(*given.args, **given.kwargs)
+
+    held.holds_ranges = True  # type: ignore[attr-defined]
+    return held
 
 
 @functools.cache

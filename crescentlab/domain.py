@@ -13,6 +13,7 @@ from dataclasses import dataclass
 from typing import Any, Literal
 
 from crescentlab import units
+from crescentlab.maths import where
 from crescentlab.units import Quantity
 
 Role = Literal["gives", "takes", "reads", "undecided"]
@@ -35,20 +36,20 @@ HYDRAULIC = Domain(
     "hydraulic",
     (("p", units.pressure),),
     (("q", units.flow),),
-    "a capacity, for example {type: capacity, volume: 10 cm^3}",
+    "a capacity, for example {type: capacity, volume: 10 cm^3}, its port on this net",
 )
 TRANSLATIONAL = Domain(
     "translational", (("x", units.length), ("v", units.velocity)), (("f", units.force),),
-    "a mass, for example {type: mass_with_stops, mass: 20 g}",
+    "a mass, for example {type: mass, mass: 20 g}, its port on this net",
 )  # fmt: skip
 ROTATIONAL = Domain(
     "rotational", (("phi", units.angle), ("omega", units.speed)), (("torque", units.torque),),
-    "a shaft speed, for example {type: speed_source, speed: 2000 rpm}",
+    "a shaft speed, for example {type: speed_source, speed: 2000 rpm}, its shaft on this net",
 )  # fmt: skip
 CHAMBER = Domain(
     "chamber", (("V", units.volume), ("dV", units.flow)), (("p", units.pressure),), "a part that shapes a volume"
 )
-SIGNAL = Domain("signal", (("", units.ratio),), (), "a source of the signal, for example {type: constant, value: 1}")
+SIGNAL = Domain("signal", (("", units.ratio),), (), "a source of the signal")
 
 ENERGY_ENTRIES: tuple[Entry, ...] = ("energy", "dissipation", "supply")
 """The entries of the ledger of energy."""
@@ -76,6 +77,21 @@ class Port(Declared):
     size: Size | None = None
     quantity: Quantity | str | None = None
     """Signals only: the quantity carried, or the name of the field that names it."""
+    low: float | None = None
+    """Signals taken only: the least value that has a meaning; less is counted as this."""
+    high: float | None = None
+    """Signals taken only: the largest value that has a meaning; more is counted as this."""
+
+    @property
+    def ranged(self) -> bool:
+        """Whether the signal that it takes is held within a range."""
+        return self.low is not None or self.high is not None
+
+    def within(self, signal: Any) -> Any:
+        """The signal held within the range; at its ends it still has its own slope."""
+        if self.low is not None:
+            signal = where(signal < self.low, self.low, signal)
+        return signal if self.high is None else where(signal > self.high, self.high, signal)
 
     def variables(self, kind: Literal["across", "through"]) -> list[tuple[str, Quantity | str]]:
         """Names (as equations use them) and quantities of the port's variables of one kind."""
@@ -162,11 +178,16 @@ def gives_signal(quantity: Any, description: str, *, size: Size | None = None) -
     )
 
 
-def takes_signal(quantity: Any, description: str, *, size: Size | None = None) -> Any:
-    """Signal input; ``quantity`` is a field type, or the name of a field that names a quantity."""
-    return Port(
-        SIGNAL, "takes", description, size, quantity if isinstance(quantity, str) else units.quantity_of(quantity)
-    )
+def takes_signal(
+    quantity: Any, description: str, *, size: Size | None = None, low: float | None = None, high: float | None = None
+) -> Any:
+    """Signal input; ``quantity`` is a field type, or the name of a field that names a quantity.
+
+    ``low`` and ``high``, in SI, are its range: equations never see a value beyond it, and a run in which the signal
+    went there warns.
+    """
+    carried = quantity if isinstance(quantity, str) else units.quantity_of(quantity)
+    return Port(SIGNAL, "takes", description, size, carried, low, high)
 
 
 @dataclass(eq=False)

@@ -17,18 +17,21 @@ from pydantic.fields import FieldInfo
 
 from crescentlab.arguments import Settings
 from crescentlab.component import Component, field_quantity, is_structural
-from crescentlab.domain import Held, Observable, Port, Scheduled, State
+from crescentlab.domain import HYDRAULIC, Held, Observable, Port, Scheduled, State
 from crescentlab.errors import ComponentError, ExpressionError, InputError, Place, UnitError, nearest
 from crescentlab.explain import validated
-from crescentlab.expressions import Value, evaluate, is_expression, number_of
+from crescentlab.expressions import Value, evaluate, is_expression, names_in, number_of
 from crescentlab.fluid import Fluid
 from crescentlab.library import Library
-from crescentlab.netlist import Netlist, NetSection, net_ports
+from crescentlab.netlist import FLUID, Netlist, NetSection, net_ports
 from crescentlab.units import QUANTITIES, Quantity, is_number, parse_any
+from crescentlab.unused import unused_parameters
 from crescentlab.yaml_text import Node
 
 MAX_SUBCIRCUIT_DEPTH = 20
 COMMAND = Place("--set", 0)
+START_PRESSURE = "start_pressure"
+"""Parameter of parts whose states are computed from it, such as lines."""
 
 
 @dataclass(frozen=True)
@@ -41,6 +44,8 @@ class Instance:
     start: dict[str, np.ndarray] = field(default_factory=dict)
     forms: tuple[type[Component], ...] = ()
     """Of a family, the causal forms that the library of its file has; of another class, itself."""
+    places: dict[str, Place | None] = field(default_factory=dict)
+    """Where each of its parameters was written, and each start value, as ``start.p``."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -103,9 +108,12 @@ def elaborate(netlist: Netlist, library: Library, settings: Settings | None = No
     overrides = _Overrides(dict(settings or {}))
     library = work.with_user_files(netlist, library)
     fluids = work.fluids(netlist, library, overrides)
+    work.start_pressure = _start_pressure(netlist, overrides)
     work.scope(netlist, library, "", {}, overrides, (netlist.folder / netlist.name,))
     overrides.check_used()
-    return Design(netlist, work.instances, work.joined_nets(), fluids, work.outputs, work.parameters)
+    warnings = [said for each in (netlist, *work.parts.values()) for said in unused_parameters(each)]
+    warnings += [f"{name}: {said}" for name, fluid in fluids.items() for said in fluid.remarks()]
+    return Design(netlist, work.instances, work.joined_nets(), fluids, work.outputs, work.parameters, tuple(warnings))
 
 
 class _Overrides:
@@ -141,6 +149,8 @@ class _Elaboration:
         self.parameters: dict[str, dict[str, Value]] = {}
         self.parts: dict[str, Netlist] = {}
         self.made: dict[Any, Any] = {}
+        self.start_pressure: float | None = None
+        """Of parts that state none of their own [Pa]."""
 
     def with_user_files(self, netlist: Netlist, library: Library) -> Library:
         for k, text in enumerate(netlist.sections.library):
@@ -162,7 +172,7 @@ class _Elaboration:
             node = replace(netlist.node.find(path), place=netlist.place(*path))
             assert isinstance(node.value, dict)
             if "type" not in node.value:
-                raise InputError("the fluid needs a type, for example fluid: {type: simple_oil}", node.place)
+                raise InputError(f"the fluid needs a type, for example fluid: {FLUID}", node.place)
             cls = library.fluid(str(node.value["type"].value), node.place_of("type"))
             made[name] = self.instance(cls, node, _scope_lookup(values, netlist), overrides, name, netlist.folder)
         return made
@@ -212,7 +222,7 @@ class _Elaboration:
     ) -> None:
         cls = library.component(kind, node.place_of("type"))
         lookup = _scope_lookup(values, netlist)
-        instance = self.instance(cls, node, lookup, overrides, full, netlist.folder)
+        instance = self.instance(cls, node, lookup, overrides, full, netlist.folder, self.start_fields(cls))
         try:
             for declared in [*cls.ports(), *cls.declared(State), *cls.declared(Held), *cls.declared(Observable)]:
                 instance.size_of(declared.size)
@@ -239,10 +249,29 @@ class _Elaboration:
                 quantity = instance.quantity(declared.quantity)
                 items = source.value if isinstance(source.value, list) else [source]
                 start[name] = np.array([_number(str(i.value), quantity, lookup, subject, i.place) for i in items])
-        self.instances[full] = Instance(full, instance, node.place, start, tuple(forms))
+            elif self.start_pressure is not None and _takes_start_pressure(cls, instance, declared):
+                start[name] = np.array([self.start_pressure])
+        assert isinstance(node.value, dict)
+        places = {name: child.place for name, child in node.value.items()}
+        places |= {f"start.{name}": child.place for name, child in given.items()}
+        written = [*cls.model_fields, *(f"start.{name}" for name in stateful)]
+        places |= {name: COMMAND for name in written if f"{full}.{name}" in overrides.used}
+        self.instances[full] = Instance(full, instance, node.place, start, tuple(forms), places)
 
-    def instance(self, cls: type[Any], node: Node, lookup: Any, overrides: _Overrides, full: str, folder: Path) -> Any:
+    def start_fields(self, cls: type[Component]) -> dict[str, float]:
+        """The parameters of a class that the circuit's start pressure serves where they are not given."""
+        if self.start_pressure is None:
+            return {}
+        named = {s.start for form in cls.forms() for s in form.declared(State) if s.quantity is QUANTITIES["pressure"]}
+        return {n: self.start_pressure for n in cls.model_fields if n == START_PRESSURE or n in named}
+
+    def instance(
+        self, cls: type[Any], node: Node, lookup: Any, overrides: _Overrides, full: str, folder: Path,
+        otherwise: Mapping[str, float] | None = None,
+    ) -> Any:  # fmt: skip
         """Validate a component or fluid; expressions become numbers first, ``--set`` texts replace.
+
+        Of parameters that nobody gives, those in ``otherwise`` have these values.
 
         Those of equal values are one object: a large circuit has few kinds of parts.
         """
@@ -266,6 +295,7 @@ class _Elaboration:
             data[name] = numbers.get(name)
             if data[name] is None:
                 data[name] = _plain(child, found, lookup, where) if found is not None else child.plain()
+        data = {**(otherwise or {}), **data}
         key = cls, folder, repr(data)
         if key in self.made:
             return self.made[key]
@@ -401,6 +431,28 @@ class _Elaboration:
         return [net for name, net in self.nets.items() if root(name) == name]
 
 
+def _start_pressure(netlist: Netlist, overrides: _Overrides) -> float | None:
+    """The start pressure of parts that state none of their own [Pa], if the circuit names one."""
+    text, place = netlist.sections.simulation.start_pressure, netlist.place("simulation", "start_pressure")
+    if text is None:
+        return None
+    values = _parameter_values(netlist, {}, overrides, "")
+    return _number(text, QUANTITIES["pressure"], _scope_lookup(values, netlist), "simulation.start_pressure", place)
+
+
+def _takes_start_pressure(cls: type[Component], instance: Component, declared: State | Held) -> bool:
+    """Whether a state begins at the circuit's start pressure: a pressure of fluid whose start is a plain number.
+
+    One that begins at a parameter or is computed follows from these (:meth:`_Elaboration.start_fields`).
+    """
+    return (
+        isinstance(declared, State)
+        and isinstance(declared.start, (int, float))
+        and instance.quantity(declared.quantity) is QUANTITIES["pressure"]
+        and any(port.domain is HYDRAULIC for port in cls.ports())
+    )
+
+
 def _kind(default: str) -> Quantity | None:
     """The quantity that a parameter's default shows; None for words, expressions, and what cannot be read."""
     if is_expression(default) or not is_number(default):
@@ -441,7 +493,17 @@ def _parameter_values(
         return values[name]
 
     for name in texts:
-        find(name)
+        todo = [name]
+        while todo:  # what a long chain rests on comes first, so that its length does not matter
+            given = overrides.values.get(prefix + todo[-1], texts[todo[-1]])
+            asked = names_in(given) if isinstance(given, str) and is_expression(given) else set()
+            waiting = [each for each in sorted(asked) if each in texts and each not in values]
+            if not waiting or todo[-1] in values or todo[-1] in passed:
+                find(todo.pop())
+            elif waiting[0] not in todo:
+                todo.append(waiting[0])
+            else:  # a circle, which is told from its first name on
+                find(todo[0])
     return values
 
 

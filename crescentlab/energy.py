@@ -55,7 +55,7 @@ def fluids_asked(cls: type[Component]) -> tuple[str, ...]:
 def fluids_needed(cls: type[Component]) -> tuple[str, ...]:
     """The fluid arguments of a class's equations, and those that only the power through its ports asks for."""
     asked = fluids_asked(cls)
-    more = [_fluid_of(cls, p) for p in power_ports(cls) if p.domain is HYDRAULIC]
+    more = [fluid_argument(cls, p) for p in power_ports(cls) if p.domain is HYDRAULIC]
     return (*asked, *dict.fromkeys(name for name in more if name not in asked))
 
 
@@ -65,7 +65,7 @@ def fluid_ports(cls: type[Component], fluid: str) -> list[str]:
     return hydraulic if fluid == "fluid" else [fluid.removeprefix("fluid_")]
 
 
-def _fluid_of(cls: type[Component], port: Port) -> str:
+def fluid_argument(cls: type[Component], port: Port) -> str:
     """The fluid argument that a port's fluid has, whether equations ask for it or not."""
     own, asked = f"fluid_{port.name}", fluids_asked(cls)
     return "fluid" if "fluid" in asked and own not in asked else own
@@ -73,7 +73,7 @@ def _fluid_of(cls: type[Component], port: Port) -> str:
 
 def powers(cls: type[Component], values: Mapping[str, Any], fluids: Mapping[str, Fluid]) -> ca.SX:
     """Power [W] into the component at every element of its ports, a column; ``values`` are the ports' variables."""
-    return column([_power(port, values, fluids.get(_fluid_of(cls, port))).sx for port in power_ports(cls)])
+    return column([_power(port, values, fluids.get(fluid_argument(cls, port))).sx for port in power_ports(cls)])
 
 
 def _power(port: Port, values: Mapping[str, Any], fluid: Fluid | None) -> Sym:

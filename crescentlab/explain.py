@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 import typing
+from difflib import get_close_matches
 from typing import Any, TypeVar
 
 from pydantic import BaseModel, ValidationError
 from pydantic.fields import FieldInfo
 
-from crescentlab.component import field_quantity
-from crescentlab.errors import InputError, Place, nearest
-from crescentlab.units import Quantity
+from crescentlab.component import Component, field_quantity
+from crescentlab.errors import InputError, Place, UnitError, nearest
+from crescentlab.units import Quantity, is_number
 from crescentlab.yaml_text import Node
 
 M = TypeVar("M", bound=BaseModel)
@@ -51,7 +52,7 @@ def explained(model: type[BaseModel], error: ValidationError, node: Node, subjec
     section, field = _field(model, path)
     if kind == "extra_forbidden":
         where = name.removesuffix(key).removesuffix(".")
-        hint = nearest(key, [info.alias or n for n, info in section.model_fields.items()])
+        hint = _instead(section, key, details["input"])
         return InputError(f"{where + ': ' if where else ''}unknown key {key!r}: {hint}", place)
     if kind == "missing":
         return InputError(f"{name} is missing{_advice(key, field)}", parent)
@@ -65,6 +66,62 @@ def explained(model: type[BaseModel], error: ValidationError, node: Node, subjec
         place = Place(limits["file"], limits["line"])
     said = said.removeprefix("Value error, ")
     return InputError(said if "[key]" in details["loc"] or not name else f"{name}: {said}", place)
+
+
+CARRIED = {
+    "rotational": ({"speed", "omega", "angle", "phi", "rpm", "shaft_speed"}, {"torque"}),
+    "translational": ({"velocity", "position", "x", "v"}, {"force", "f", "load"}),
+    "hydraulic": ({"pressure", "p"}, {"flow", "q"}),
+}
+"""Names of what comes in across a port of a domain, and through it."""
+SOURCES = {
+    "speed": "speed_source", "omega": "speed_source", "rpm": "speed_source", "shaft_speed": "speed_source",
+    "force": "force_source", "f": "force_source", "load": "force_source", "torque": "torque_source",
+    "pressure": "pressure_source", "p": "pressure_source", "flow": "flow_source", "q": "flow_source",
+}  # fmt: skip
+
+
+def _instead(section: type[BaseModel], key: str, written: Any) -> str:
+    """What to write instead of a key that does not exist: the port that takes what is meant, or the nearest key.
+
+    A key of another quantity than the text has means something else, unless it differs by a slip of the pen alone.
+    """
+    fields = {info.alias or name: info for name, info in section.model_fields.items()}
+    if not issubclass(section, Component):
+        return nearest(key, fields)
+    for port in section.ports():
+        if key == port.name:
+            return f"it is a port ({port.description}); join it under nets:, as component.{key}"
+    fitting = [name for name, info in fields.items() if _fits(info, written) or _slip(key, name)]
+    for port in section.ports():
+        across, through = CARRIED.get(port.domain.name, (set(), set()))
+        comes_in, goes_out = (through, across) if port.role == "gives" else (across, through)
+        if key in comes_in and port.role != "undecided":
+            source = f", for example a {SOURCES[key]}" if key in SOURCES else ""
+            near = nearest(key, fitting, otherwise=" ") if port.domain.name == "hydraulic" else " "
+            also = f"; or {near}" if near.strip() else ""
+            return (
+                f"it comes in through the port {port.name} ({port.description}), from what joins its net{source}{also}"
+            )
+        if key in goes_out and port.domain.name != "hydraulic":
+            return f"the part itself gives it, at its port {port.name} ({port.description}); it is no parameter"
+    return nearest(key, fitting, otherwise=f"known: {', '.join(sorted(fields)) or 'none'}")
+
+
+def _slip(key: str, name: str) -> bool:
+    return bool(get_close_matches(key, [name], n=1, cutoff=0.85))
+
+
+def _fits(info: FieldInfo, written: Any) -> bool:
+    """Whether a text may be a value of the field: of its quantity, if both have one."""
+    quantity = field_quantity(info)
+    if quantity is None or not isinstance(written, str) or not is_number(written):
+        return True
+    try:
+        quantity.parse(written)
+    except UnitError:
+        return False
+    return True
 
 
 def _first(error: ValidationError, node: Node) -> Any:

@@ -87,6 +87,24 @@ def evaluate(
     return result
 
 
+def names_in(text: str) -> set[str]:
+    """Names that an expression asks for, those of functions left out; none for text that is no expression."""
+    try:
+        tree, literals = _parse(text.removeprefix("=").strip())
+    except ExpressionError:
+        return set()
+    found: set[str] = set()
+    todo: list[ast.AST] = [tree]
+    while todo:
+        node = todo.pop()
+        name = _dotted(node)
+        if name is not None:
+            found.add(name)
+        else:
+            todo += node.args if isinstance(node, ast.Call) else ast.iter_child_nodes(node)
+    return found - literals.keys() - {"pi"}
+
+
 def number_of(value: Value, quantity: Quantity) -> float:
     """The SI number of an expression that must give ``quantity``."""
     if isinstance(value.value, (str, bool, np.bool_)):
@@ -140,12 +158,11 @@ def _parse(body: str) -> tuple[ast.expr, dict[str, Value]]:
 
 
 def _dotted(node: ast.AST) -> str | None:
-    if isinstance(node, ast.Name):
-        return node.id
-    if isinstance(node, ast.Attribute):
-        base = _dotted(node.value)
-        return f"{base}.{node.attr}" if base else None
-    return None
+    parts: list[str] = []
+    while isinstance(node, ast.Attribute):
+        parts.append(node.attr)
+        node = node.value
+    return ".".join([node.id, *reversed(parts)]) if isinstance(node, ast.Name) else None
 
 
 def _power(base: Any, exponent: float) -> Any:
@@ -287,7 +304,7 @@ class _Walker:
         if name == "atan2" and len(values) == 2:
             a, b = self.alike(values[0], values[1], "compare")
             return Value(_float(maths.atan2(a.value, b.value)), QUANTITIES["angle"])
-        if len(values) != 1 or name in _SAME:
+        if len(values) != 1 or name in (*_SAME, "where", "atan2"):
             wanted = {"where": "three arguments", "atan2": "two arguments"}.get(name, "one argument")
             raise self.fail(f"{name} takes {'two or more arguments' if name in _SAME else wanted}")
         return self.single(name, values[0])

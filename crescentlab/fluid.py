@@ -12,6 +12,8 @@ from crescentlab.units import Pressure
 
 P_ATM = 101325.0
 """Standard atmosphere [Pa]: gauge pressure + P_ATM is absolute pressure."""
+HIGHEST_PRESSURE = 1000e5
+"""Highest gauge pressure [Pa] of a law that says nothing else: docs/fluids.md, its range."""
 
 
 class Fluid(BaseModel):
@@ -37,6 +39,13 @@ class Fluid(BaseModel):
         default=False, description="true: pressures below absolute zero warn instead of ending the run"
     )
     atmospheric_pressure: Pressure = Field(default=P_ATM, gt=0, description="absolute pressure at 0 bar gauge")
+    highest_pressure: Pressure = Field(
+        default=HIGHEST_PRESSURE, gt=0, description="gauge pressure up to which its law is meant; beyond, a run warns"
+    )
+
+    def remarks(self) -> list[str]:
+        """Sentences on numbers for which its laws are not meant; `check` and runs warn of them."""
+        return []
 
     def density(self, p: Expr) -> Expr:
         """rho(p) [kg/m^3]."""
@@ -49,6 +58,11 @@ class Fluid(BaseModel):
     def kinematic_viscosity(self, p: Expr) -> Expr:
         """nu(p) [m^2/s]."""
         raise NotImplementedError
+
+    @property
+    def cavity_pressure(self) -> Any:
+        """Pressure [Pa, gauge] at which it evaporates; None for a fluid without vapour."""
+        return None
 
     def dynamic_viscosity(self, p: Expr) -> Expr:
         """mu(p) = rho nu [Pa s]."""

@@ -39,6 +39,8 @@ OutputName = Annotated[
 ]
 
 
+FLUID = "{type: simple_oil, density: 860 kg/m^3, kinematic_viscosity: 35 cSt, bulk_modulus: 14000 bar}"
+"""A fluid as messages write it."""
 SMALLEST_RTOL = 1e-13
 """Below this, rounding spoils what a solver compares."""
 
@@ -80,6 +82,12 @@ class SimulationSection(_Section):
     )
     output_step: Time | None = Field(default=None, gt=0, description="uniform output grid; default the accepted steps")
     compile: bool | None = Field(default=None, description="compile the equations; default where it pays")
+    start: Literal["steady"] | None = Field(
+        default=None, description="steady: the run begins at the operating point; default: at the start values"
+    )
+    start_pressure: str | None = Field(
+        default=None, description="start pressure of every part that states none of its own; an expression too"
+    )
     stop_when: str | None = Field(default=None, description="a condition that ends the run: line.p > 9 bar")
     period: str | None = Field(
         default=None, description="time after which the circuit repeats itself, an expression too: '= 2 * pi / speed'"
@@ -171,7 +179,7 @@ class Netlist:
 
 
 _KINDS: dict[str, tuple[type, str]] = {
-    "fluid": (dict, "{type: simple_oil, density: 860 kg/m^3}"), "fluids": (dict, "{oil: {type: simple_oil}}"),
+    "fluid": (dict, FLUID), "fluids": (dict, f"{{oil: {FLUID}}}"),
     "parameters": (dict, "{supply: 30 L/min}"), "components": (dict, "{tank: {type: tank}}"),
     "ports": (dict, "{inlet: p_line}"),
     "nets": (dict, "{p_line: [pump.port, line.port]}"), "outputs": (dict, "{loss: '= line.p * valve.q'}"),
@@ -195,7 +203,7 @@ def _collections(node: Node) -> None:
         if not isinstance(node.find(("nets", name)).value, dict):
             _shaped(node, ("nets", name), list, "[pump.port, line.port]")
     for name in _keys(node, "fluids"):
-        _shaped(node, ("fluids", name), dict, "{type: simple_oil, density: 860 kg/m^3}")
+        _shaped(node, ("fluids", name), dict, FLUID)
 
 
 def _keys(node: Node, section: str) -> list[str]:

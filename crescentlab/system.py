@@ -17,14 +17,16 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
+from crescentlab import units
 from crescentlab.causality import Plan
 from crescentlab.columns import Columns
-from crescentlab.component import Component
+from crescentlab.component import Component, field_quantity
 from crescentlab.domain import Held, Scheduled, State
-from crescentlab.elaborate import Design
+from crescentlab.elaborate import COMMAND, Design
 from crescentlab.energy import keeps_books, power_ports
 from crescentlab.errors import InputError, nearest
 from crescentlab.prepared import LARGE, Prepared, jacobian, prepare, shared
+from crescentlab.pressures import ASKED, GivenPressure, absolute_zeros, own_pressures
 from crescentlab.schedule import Following
 from crescentlab.symbols import column
 from crescentlab.trace import numeric_fields, structure_of
@@ -71,6 +73,8 @@ class Bits:
     held_dependent: Array
     switches: Array
     """Chooses a value; the others serve conditions of events alone."""
+    floors: Array
+    """Holds a given pressure above absolute zero: sought where it turns, never throughout a step."""
 
 
 @dataclass
@@ -114,6 +118,8 @@ class System:
     counting_held: Array
     """Shape (k,): such held values."""
     bits: Bits
+    given: tuple[GivenPressure, ...]
+    """Pressures that ports give and that are neither states nor held values."""
     _variables: Callable[[], dict[str, Variable]]
     remapping: Callable[[list[bool]], tuple[ca.SX, list[ca.SX]]]
     """Which events may fire -> symbols (1 where one fires), and the new x and h as expressions of them."""
@@ -276,12 +282,63 @@ class System:
         for each in following:
             schedule = each.schedule(values.start_time, values.start_time)
             values.h0[each.places] = schedule.rows[schedule.at(values.start_time)]
+        self.check_constants(values, design)
         ticks = [event.name for event in self.events if event.kind == "every"]
         for tick, period in zip(ticks, np.array(self.period(values.p)).ravel() if ticks else (), strict=True):
             if not period > 0:
                 place = design.instances[tick.rpartition(".")[0]].place
                 raise InputError(f"{tick}: its period is {period:g} s; it must be above 0", place)
         return values
+
+    def check_constants(self, values: Values, design: Design) -> None:
+        """Raise :class:`InputError` if a start, or a pressure that parameters alone give, lies below absolute zero."""
+        fluids = self.plan.design.fluids
+        constant = [each for each in self.given if not each.moving]
+        starts = [
+            (names[k], fluid, start[k])
+            for names, quantities, start in (
+                (self.state_names, self.state_quantities, values.x0), (self.held_names, self.held_quantities, values.h0)
+            )
+            for k, fluid in own_pressures(self.plan, names, quantities)
+        ]  # fmt: skip
+
+        def made() -> ca.Function:
+            lowest = absolute_zeros(self.plan, self.p, (*fluids, None))
+            return ca.Function("constants", [self.p], [column([each.expression for each in constant]), lowest])
+
+        pressures, lowest = (np.array(each).ravel() for each in self.once("constant pressures", made)(values.p))
+        floors = dict(zip((*fluids, None), lowest.tolist(), strict=True))
+        floors |= {name: -np.inf for name, fluid in fluids.items() if fluid.tension}
+        for each, p in zip(constant, pressures.tolist(), strict=True):
+            if p < floors[each.fluid]:
+                raise self.impossible(design, each.owner, each.name, each.parameters, p, floors[each.fluid])
+        for full, fluid, p in starts:
+            if p < floors[fluid]:
+                owner, _, name = full.rpartition(".")
+                name = name.partition("[")[0]
+                fields = type(self.plan.components[owner]).model_fields
+                given = [
+                    n for n, info in fields.items() if n.startswith("start") and field_quantity(info) is units.pressure
+                ]
+                raise self.impossible(
+                    design, owner, f"{owner}.start.{name}", (f"start.{name}", *given), p, floors[fluid]
+                )
+
+    @staticmethod
+    def impossible(
+        design: Design, owner: str, name: str, fields: Sequence[str], p: float, floor: float
+    ) -> InputError:  # fmt: skip
+        """What is said of a pressure below absolute zero, where the first of the part's ``fields`` was written."""
+        instance = design.instances[owner]
+        field = next((n for n in fields if n in instance.places), None)
+        name = name if field is None else f"{owner}.{field}"
+        place = instance.place if field is None else instance.places[field]
+        if place is COMMAND:
+            name, place = f"--set {name}", None
+        show = units.pressure.show
+        return InputError(
+            f"{name}: {show(p, 'bar')} gauge is below absolute zero ({show(floor, 'bar')}); {ASKED}", place
+        )
 
 
 def _start(

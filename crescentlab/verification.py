@@ -99,8 +99,8 @@ class Verification:
         told += [str(event) for event in self.events[:NAMED]]
         told += [f"{len(self.events) - NAMED} more events differ"] if len(self.events) > NAMED else []
         return [
-            f"NOT VERIFIED: the runs at rtol {self.rtol:g} and {self.tighter:g} do not agree: {'; '.join(told)}; write a "
-            f"smaller --rtol and verify again; if it never agrees, what happens hangs on differences that no run resolves"
+            f"NOT VERIFIED: the runs at rtol {self.rtol:g} and {self.tighter:g} do not agree: {'; '.join(told)}; write "
+            "a smaller --rtol and verify again; if it never agrees, what happens hangs on what no run resolves"
         ]
 
     def amount(self, output: OutputError) -> str:
@@ -110,7 +110,8 @@ class Verification:
 
     def shown(self, output: OutputError) -> str:
         """An output's difference with its unit, its share and its time."""
-        return f"{self.amount(output)} ({100 * output.share:.2g} % of its range) at {QUANTITIES['time'].show(output.time, 'ms')}"
+        time = QUANTITIES["time"].show(output.time, "ms")
+        return f"{self.amount(output)} ({100 * output.share:.2g} % of its range) at {time}"
 
     def as_json(self) -> dict[str, Any]:
         """Plain data for ``--json``; differences in SI."""
@@ -123,9 +124,9 @@ class Verification:
 def verification(first: Result, second: Result, rtol: float, tighter: float) -> Verification:
     """Compare a run with the same at a tighter tolerance.
 
-    Over the time that both cover, at the first run's steps and halfway between. Instants between the times of an event, or
-    of a relation's turn, in the one run and in the other are left out: the difference there is the whole jump. Times of
-    events are compared instead.
+    Over the time that both cover, at the first run's steps and halfway between. Instants between the times of an
+    event, or of a relation's turn, in the one run and in the other are left out: the difference there is the whole
+    jump. Times of events are compared instead.
     """
     one, other = first.trajectory, second.trajectory
     ended = ""

@@ -42,8 +42,8 @@ RANGES: dict[str, tuple[float, float]] = {
     "pressure": (5e5, 60e5), "pressure_difference": (1e5, 20e5), "flow": (2 / 6e4, 30 / 6e4), "volume": (3e-5, 3e-4),
     "displacement": (0.5e-6, 4e-6), "length": (4e-3, 15e-3), "area": (2e-6, 30e-6), "time": (1e-3, 20e-3),
     "frequency": (20.0, 200.0), "angle": (0.1, 1.2), "speed": (50.0, 200.0), "velocity": (0.02, 0.2),
-    "mass": (0.5, 10.0), "inertia": (1e-3, 2e-2), "force": (50.0, 800.0), "torque": (0.5, 10.0),
-    "energy": (1.0, 100.0), "power": (50.0, 2000.0), "density": (840.0, 890.0), "kinematic_viscosity": (10e-6, 60e-6),
+    "mass": (0.5, 10.0), "inertia": (1e-3, 2e-2), "force": (50.0, 800.0), "torque": (0.5, 10.0), "energy": (1.0, 100.0),
+    "power": (50.0, 2000.0), "density": (840.0, 890.0), "kinematic_viscosity": (10e-6, 60e-6),
     "stiffness": (5e3, 60e3), "damping": (50.0, 1500.0), "rotary_stiffness": (50.0, 2000.0),
     "rotary_damping": (0.01, 0.3), "flow_resistance": (6e8, 2e10), "quadratic_resistance": (1e11, 2e13),
     "flow_conductance": (1e-11, 1e-10), "acceleration": (9.0, 10.0), "ratio": (0.2, 1.0),
@@ -61,16 +61,15 @@ NAMED: dict[str, tuple[float, float]] = {
     "wide_diameter": (10e-3, 20e-3), "inner_diameter": (10e-3, 20e-3), "outer_diameter": (25e-3, 40e-3),
     "wall_thickness": (1e-3, 3e-3), "standard_deviation": (0.01, 0.1), "arm_a": (0.05, 0.2), "arm_b": (0.05, 0.2),
     "static_friction": (300.0, 400.0), "coulomb_friction": (50.0, 250.0), "play": (0.0, 0.02), "clogging": (0.5, 1.0),
-    "loss_coefficient": (0.0, 2.0), "preload": (10.0, 300.0), "rated_drop": (2e5, 20e5),
-    "remaining_area": (1e-6, 3e-6), "ball_diameter": (12e-3, 16e-3), "seat_diameter": (4e-3, 8e-3),
-    "seat_position": (0.0, 2e-3), "overlap": (-1e-3, 2e-3), "creep_speed": (0.5, 2.0), "ratio": (0.5, 3.0),
-    "polytropic_index": (1.0, 1.6), "swash_angle": (0.1, 0.3), "largest_swash_angle": (0.1, 0.3),
-    "pitch_radius": (30e-3, 40e-3), "free_length": (-5e-3, 5e-3), "gap": (-1e-3, 0.0), "mean_pressure": (20e5, 40e5),
-    "per": (1.0, 1.0), "kidney_width": (6e-3, 9e-3), "kidney_angle": (0.4, 0.5), "angle": (0.2, 1.4),
-    "switching_pressure": (0.5e5, 2e5), "integral_time": (5e-3, 50e-3), "time_constant": (1e-3, 10e-3),
-    "within": (2e-3, 20e-3), "atmospheric_pressure": (101325.0, 101325.0), "rod_dead_volume": (1e-5, 5e-5),
-    "cap_dead_volume": (1e-5, 5e-5), "outlet_height": (0.0, 0.05), "viscous_friction": (100.0, 1500.0),
-    "max_pressure": (300e5, 400e5),
+    "loss_coefficient": (0.0, 2.0), "preload": (10.0, 300.0), "rated_drop": (2e5, 20e5), "remaining_area": (1e-6, 3e-6),
+    "ball_diameter": (12e-3, 16e-3), "seat_diameter": (4e-3, 8e-3), "seat_position": (0.0, 2e-3),
+    "overlap": (-1e-3, 2e-3), "creep_speed": (0.5, 2.0), "ratio": (0.5, 3.0), "polytropic_index": (1.0, 1.6),
+    "swash_angle": (0.1, 0.3), "largest_swash_angle": (0.1, 0.3), "pitch_radius": (30e-3, 40e-3),
+    "free_length": (-5e-3, 5e-3), "gap": (-1e-3, 0.0), "mean_pressure": (20e5, 40e5), "per": (1.0, 1.0),
+    "kidney_width": (6e-3, 9e-3), "kidney_angle": (0.4, 0.5), "angle": (0.2, 1.4), "switching_pressure": (0.5e5, 2e5),
+    "integral_time": (5e-3, 50e-3), "time_constant": (1e-3, 10e-3), "within": (2e-3, 20e-3),
+    "atmospheric_pressure": (101325.0, 101325.0), "rod_dead_volume": (1e-5, 5e-5), "cap_dead_volume": (1e-5, 5e-5),
+    "outlet_height": (0.0, 0.05), "viscous_friction": (100.0, 1500.0), "max_pressure": (300e5, 400e5),
 }  # fmt: skip
 """The same by the parameter's name, ..."""
 
@@ -83,17 +82,18 @@ OF_TYPE: dict[str, tuple[float, float]] = {
     "rotary_friction.viscous_friction": (0.01, 0.1), "fan_load.rated_speed": (100.0, 200.0),
     "torsion_spring.preload": (-2.0, 2.0), "pressure_source.pressure": (0.0, 60e5), "tank.pressure": (0.0, 5e5),
     "flow_source.flow": (-10 / 6e4, 30 / 6e4), "motion_source.velocity": (-0.05, 0.05),
-    "force_source.force": (-500.0, 500.0), "torque_source.torque": (-5.0, 5.0),
-    "rated_orifice.rated_flow": (5 / 6e4, 40 / 6e4), "floating_lever.share": (0.2, 0.8),
+    "force_source.force": (-500.0, 500.0),
+    "torque_source.torque": (-5.0, 5.0), "rated_orifice.rated_flow": (5 / 6e4, 40 / 6e4),
+    "floating_lever.share": (0.2, 0.8),
     "compliant_capacity.wall_area": (1e-4, 1e-3), "piston_chamber.dead_volume": (5e-5, 1e-4),
     "piston_chamber.diameter": (10e-3, 30e-3), "moving_annular_gap.length": (10e-3, 40e-3),
-    "leakage_land.overlap": (1e-3, 5e-3), "second_order_lag.damping_ratio": (0.2, 1.0),
-    "gear_ratio.ratio": (0.5, 2.0), "transfer_function.time_unit": (1e-3, 5e-3), "bend.radius": (20e-3, 60e-3),
-    "swash_plate.pitch_radius": (10e-3, 20e-3), "two_two_valve.overlap": (-0.2, 0.2),
-    "three_two_valve.overlap": (-0.2, 0.2), "four_two_valve.overlap": (-0.2, 0.2),
+    "leakage_land.overlap": (1e-3, 5e-3), "second_order_lag.damping_ratio": (0.2, 1.0), "gear_ratio.ratio": (0.5, 2.0),
+    "transfer_function.time_unit": (1e-3, 5e-3), "bend.radius": (20e-3, 60e-3),
+    "swash_plate.pitch_radius": (10e-3, 20e-3),
+    "two_two_valve.overlap": (-0.2, 0.2), "three_two_valve.overlap": (-0.2, 0.2), "four_two_valve.overlap": (-0.2, 0.2),
     "four_three_valve.overlap": (-0.2, 0.2), "short_tube.length": (5e-3, 50e-3),
-    "spool_drive.damping_ratio": (0.3, 1.0), "energy_counter.start": (0.0, 0.0), "cushion.end": (0.0, 5e-3),
-    "elastic_contact.clearance": (0.0, 5e-3),
+    "spool_drive.damping_ratio": (0.3, 1.0),
+    "energy_counter.start": (0.0, 0.0), "cushion.end": (0.0, 5e-3), "elastic_contact.clearance": (0.0, 5e-3),
 }  # fmt: skip
 """... and by type and name."""
 
@@ -109,9 +109,11 @@ SIGNALS: dict[str, tuple[float, float]] = {
 
 SENSORS = {
     "pressure": ("pressure_sensor", "differential_pressure_sensor"), "flow": ("flow_sensor",),
-    "speed": ("speed_sensor",), "angle": ("angle_sensor",), "length": ("position_sensor",),
-    "velocity": ("velocity_sensor",), "force": ("force_sensor",), "torque": ("torque_sensor",),
-    "power": ("hydraulic_power_meter", "linear_power_meter", "shaft_power_meter"), "volume": ("volume_counter",),
+    "speed": ("speed_sensor",),
+    "angle": ("angle_sensor",), "length": ("position_sensor",), "velocity": ("velocity_sensor",),
+    "force": ("force_sensor",),
+    "torque": ("torque_sensor",), "power": ("hydraulic_power_meter", "linear_power_meter", "shaft_power_meter"),
+    "volume": ("volume_counter",),
 }  # fmt: skip
 LETTERS = {"hydraulic": "p", "translational": "x", "rotational": "r", "chamber": "c", "signal": "s"}
 """First letters of the nets' names."""

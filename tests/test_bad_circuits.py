@@ -168,7 +168,10 @@ NETS = {
         edited((f"{OIL}\n", ""), (f"pump: {PUMP}", f"pump: {PUMP}"), ("start: {p: 1 bar}}", "start: {p: 1 bar}} <--")),
         "the circuit names no fluid; write",
     ),
-    "empty fluid": (edited((OIL, f"fluid:{MARK}")), "the fluid needs a type, for example fluid: {type: simple_oil}"),
+    "empty fluid": (
+        edited((OIL, f"fluid:{MARK}")),
+        "the fluid needs a type, for example fluid: {type: simple_oil, density: 860 kg/m^3, kinematic_viscosity: ",
+    ),
     "fluid and fluids": (
         edited((STOP, f"{STOP}\nfluids: {{oil: {{type: simple_oil}}}}{MARK}")),
         "write either fluid: or fluids:, not both",

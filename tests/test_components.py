@@ -178,10 +178,10 @@ def test_power_is_accounted_for() -> None:
 TYPES = listed(LIBRARY)
 OF_ANY_SIGN = {
     "at", "change_factor", "clearance", "damping_length", "delivery_closes", "delivery_opens", "denominator", "end",
-    "flow", "force", "free_length", "gap", "high", "jet_coefficient", "low", "mean_pressure", "numerator", "offset", "overlap",
+    "flow", "force", "free_length", "gap", "high", "jet_coefficient", "low", "mean_pressure", "numerator", "overlap",
     "phase", "position", "preload", "pressure", "seat_position", "share", "speed", "start_angle", "start_flow",
     "start_phase", "start_pressure", "suction_closes", "suction_opens", "surface_pressure", "torque", "velocity",
-    "weights",
+    "weights", "offset",
 }  # fmt: skip
 """Positions, angles, gauge pressures, imposed values and starts, which may be anything."""
 

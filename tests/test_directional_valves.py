@@ -96,11 +96,18 @@ def test_tandem_centre_unloads_the_pump() -> None:
     assert run["left.p"][-1] == pytest.approx(full, rel=5e-3)
 
 
-def test_area_ratio_of_a_four_three_valve() -> None:
-    """Edges at B of half the area pass half the flow, at the same drop."""
-    even, half = FourThreeValve(area=10e-6), FourThreeValve(area=10e-6, area_ratio=0.5)
-    assert four(1.0, half)["q_b_tank"] == pytest.approx(0.5 * four(1.0, even)["q_b_tank"], rel=1e-3)
-    assert four(1.0, half)["q_supply_a"] == four(1.0, even)["q_supply_a"]
+@pytest.mark.parametrize("ratio", [0.5, 2.0])
+@pytest.mark.parametrize("x", [-1.0, 0.7, 1.0])
+def test_area_ratio_of_a_four_three_valve(x: float, ratio: float) -> None:
+    """Edges at B of half or twice the area pass half or twice the flow at the same drop, also fully open.
+
+    1e-3: the discharge coefficient, by the flow number of another diameter.
+    """
+    even, other = FourThreeValve(area=10e-6), FourThreeValve(area=10e-6, area_ratio=ratio)
+    at_b = "q_b_tank" if x > 0 else "q_supply_b"
+    assert four(x, even)[at_b] > 0
+    assert four(x, other)[at_b] == pytest.approx(ratio * four(x, even)[at_b], rel=1e-3)
+    assert four(x, other)["q_supply_a"] == four(x, even)["q_supply_a"]
 
 
 @pytest.mark.parametrize(("x", "into", "out"), [(0.0, 0.0, 1.0), (0.5, 0.0, 0.0), (1.0, 1.0, 0.0)])

@@ -61,7 +61,7 @@ class TwoLags(Component):
         return {"der_fast": 1e6 * (1e5 * cos(100 * t) - fast), "der_slow": 100.0 * (fast - slow)}
 
 
-def volumes(*sizes: str) -> Circuit:
+def volumes(*sizes: str, solver: str = "auto") -> Circuit:
     """Volumes that empty through equal gaps, each by itself."""
     parts: dict[str, dict[str, object]] = {"tank": {"type": "tank"}}
     nets: dict[str, list[str]] = {"t": ["tank.port"]}
@@ -70,7 +70,7 @@ def volumes(*sizes: str) -> Circuit:
         parts[f"gap{k}"] = LEAK
         nets[f"p{k}"] = [f"v{k}.port", f"gap{k}.a"]
         nets["t"].append(f"gap{k}.b")
-    return circuit(components=parts, nets=nets, fluid=OIL, simulation={"stop": "10 ms"})
+    return circuit(components=parts, nets=nets, fluid=OIL, simulation={"stop": "10 ms", "solver": solver})
 
 
 # -- modes ---------------------------------------------------------------------------------------
@@ -162,12 +162,43 @@ def test_stiffness_is_told_by_the_steps_of_an_explicit_method() -> None:
     found = examine(lags)
     assert found.explicit_steps == pytest.approx(1e6 * 0.1 / 3, rel=1e-6)
     assert found.stiff
-    assert "use --solver rodas or bdf" in " ".join(advice(found))
+    assert "where rodas took" in " ".join(advice(found))
+    assert "--solver radau or lsoda as well" in " ".join(advice(found)), "not the one in use"
     taken = lags.simulate(solver="rk45").trajectory.statistics.steps
     assert taken == pytest.approx(found.explicit_steps, rel=0.25)
     calm = examine(volumes("1 cm^3"), stop="1 ms")
     assert not calm.stiff
     assert "--solver dopri may be faster" in " ".join(advice(calm))
+
+
+def test_advice_names_no_solver_in_use() -> None:
+    """Neither that of the examination nor that of the circuit."""
+    stiff = alone(TwoLags, simulation={"stop": "100 ms", "rtol": "1e-4", "solver": "radau"})
+    said = " ".join(advice(examine(stiff)))
+    assert "--solver lsoda as well" in said
+    assert "--solver rodas" not in said
+    calm = volumes("1 cm^3", solver="dopri")
+    assert "--solver" not in " ".join(advice(examine(calm, stop="1 ms")))
+
+
+def test_what_a_lift_is_about_is_not_to_be_left_out() -> None:
+    """10 kN pull a mass at 1 m/s against a damper: nothing stays in it, 10 kN 1 m/s 10 ms = 100 J pass there.
+
+    Another mass, 1 g at 1 m/s on a spring of 1 N/m: m v^2/2 sin^2(omega t) = 0.05 mJ pass, and whether it is needed may
+    be asked.
+    """
+    parts = {"load": {"type": "mass", "mass": "1 kg", "start": {"v": "1 m/s"}},
+             "pull": {"type": "force_source", "force": "10 kN"},
+             "brake": {"type": "damper", "coefficient": "10 kN s/m"},
+             "other": {"type": "mass", "mass": "1 g", "start": {"v": "1 m/s"}},
+             "spring": {"type": "spring", "stiffness": "1 N/m"}}  # fmt: skip
+    nets = {"lift": ["load.port", "pull.rod", "brake.rod"], "shaken": ["other.port", "spring.rod"]}
+    found = examine(circuit(components=parts, nets=nets, simulation={"stop": "10 ms"}))
+    assert found.index["load"] < 1e-9
+    assert found.passed_on["load"] == pytest.approx(100, rel=1e-6)
+    assert found.passed_on["other"] == pytest.approx(0.5e-3 * np.sin(np.sqrt(1e3) * 10e-3) ** 2, rel=1e-4)
+    assert not found.without_part("load")
+    assert found.without_part("other")
 
 
 def bouncing() -> Circuit:

@@ -256,6 +256,9 @@ def test_no_events_within_an_integral():
     """A table's knots are events where the circuit is, as the tracer asks, and none at the nodes of a quadrature."""
 
     class Refusing:
+        def __init__(self):
+            self.halvings = {}
+
         def bit(self, relation):
             raise AssertionError(relation)
 

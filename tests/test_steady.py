@@ -369,7 +369,10 @@ class Bead(Component):
 def test_an_unstable_point_is_told():
     """At 0: lambda^2 + lambda - 1 = 0, so e-fold in 2/(sqrt(5) - 1) = 1.618 s; at 1: real part -1/2."""
     parts = {"bead": {"type": "bead"}}
-    (said,) = steady(circuit(Bead, components=parts)).warnings
+    unstable = steady(circuit(Bead, components=parts))
+    assert unstable.time_constant is None, "what dies away in the other mode is no way back"
+    assert "dies away" not in summary(unstable, None)
+    (said,) = unstable.warnings
     assert said.startswith("the point is unstable: a disturbance of bead.")
     assert "1.62e+03 ms" in said
     stable = steady(circuit(Bead, components={"bead": {"type": "bead", "start": {"x": "1.2 m"}}}))

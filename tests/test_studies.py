@@ -500,3 +500,58 @@ def test_the_relief_valve_study_gives_the_pressures_it_states(
     Path("s.yaml").write_text(short, encoding="utf-8")
     rows = told(capsys, "study", "s.yaml")["table"]
     assert [round(row["pressure"] / 1e5, 2) for row in rows] == [7.98, 9.02, 9.42]
+
+
+ORDERS = ["-1 mm2, 0 mm2, 3 mm2, 4 mm2", "4 mm2, 3 mm2, 0 mm2, -1 mm2", "0 mm2, 4 mm2, -1 mm2, 3 mm2"]
+SWEPT = """crescentlab: 1
+fluid: {type: simple_oil, density: 860 kg/m^3, kinematic_viscosity: 30 cSt, bulk_modulus: 14000 bar}
+parameters: {a: 5 mm2, n: 2}
+components:
+  pump: {type: flow_source, flow: 10 L/min}
+  line: {type: capacity, volume: 1 L}
+  load: {type: orifice, area: = a}
+  tank: {type: tank}
+nets:
+  p1: [pump.port, line.port, load.a]
+  p2: [load.b, tank.port]
+simulation: {stop: 1 s}
+"""
+
+
+@pytest.mark.parametrize("order", ORDERS)
+def test_rows_are_the_same_in_any_order(order: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """An area below 0 is refused and one of 0 has no way out: rows, wherever they stand.
+
+    The other two from q = C_d A sqrt(2 dp / rho), with C_d at its largest for flow numbers in the thousands: the
+    pressures are as the inverse squares of the areas, 16/9, but for the density at the mean pressure (below 1 %).
+    """
+    (tmp_path / "swept.yaml").write_text(SWEPT, encoding="utf-8")
+    (tmp_path / "s.yaml").write_text(
+        f"crescentlab_study: 1\ncircuit: swept.yaml\nvary: {{list: {{a: [{order}]}}}}\n"
+        "run: {analysis: steady}\nmeasure: {p: final(line.p)}\n",
+        encoding="utf-8",
+    )
+    assert main(["study", str(tmp_path / "s.yaml"), "-o", str(tmp_path / "rows"), "--json"]) == 0
+    rows = {row["a"]: row for row in json.loads(capsys.readouterr().out)["table"]}
+    assert [rows[a]["status"] for a in (-1e-6, 0.0, 3e-6, 4e-6)] == ["failed", "failed", "done", "done"]
+    assert rows[-1e-6]["reason"] == "swept.yaml:7: load.area must be at least 0, not -1 mm2"
+    assert "has no way out" in rows[0.0]["reason"]
+    assert rows[3e-6]["p"] / rows[4e-6]["p"] == pytest.approx(16 / 9, rel=0.01)
+
+
+def test_a_time_that_one_point_makes_impossible_is_its_row(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """A window of 0 s and one beyond the run at the first points; a name that there is not is refused at once."""
+    (tmp_path / "swept.yaml").write_text(SWEPT, encoding="utf-8")
+    text = (
+        "crescentlab_study: 1\ncircuit: swept.yaml\nvary: {list: {n: [0, 1000, 1]}}\n"
+        "run: {stop: 0.1 s, window: = n * 10 ms}\nmeasure: {p: mean(line.p)}\n"
+    )
+    (tmp_path / "s.yaml").write_text(text, encoding="utf-8")
+    assert main(["study", str(tmp_path / "s.yaml"), "-o", str(tmp_path / "rows"), "--json"]) == 0
+    rows = json.loads(capsys.readouterr().out)["table"]
+    assert [row["status"] for row in rows] == ["failed", "failed", "done"]
+    assert "0 s, where a time above 0 is needed" in rows[0]["reason"]
+    assert "is longer than the run" in rows[1]["reason"]
+    (tmp_path / "s.yaml").write_text(text.replace("= n *", "= m *"), encoding="utf-8")
+    assert main(["study", str(tmp_path / "s.yaml"), "-o", str(tmp_path / "rows")]) == 2
+    assert "no parameter 'm'" in capsys.readouterr().err

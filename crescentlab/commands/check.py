@@ -14,6 +14,7 @@ from crescentlab.circuit import load
 from crescentlab.commands import arguments as shared
 from crescentlab.commands.text import counted, settings, table, wrapped
 from crescentlab.graph import Member, Net
+from crescentlab.pressures import settings_too_high
 from crescentlab.units import gauge_of
 from crescentlab.yaml_text import Node
 
@@ -63,6 +64,7 @@ def facts(plan: Plan) -> dict[str, Any]:
             for name, component in plan.components.items()
             for said in component.remarks(netlist.sections.simulation.stop)
         ] + [f"{said}: pressures are gauge, above 1.01325 bar absolute" for said in _absolute(netlist.node)],
+        "warnings": [*plan.design.warnings, *settings_too_high(plan)],
         "forms": {name: type(c).type_name() for name, c in plan.components.items() if name in flexible},
     }  # fmt: skip
 
@@ -131,7 +133,8 @@ def told(plan: Plan, found: dict[str, Any]) -> str:
     lines += [f"  form        {name} is {form}: {_ends(plan, name)}" for name, form in found["forms"].items()]
     lines += [wrapped("  remark      ", said) for said in found["remarks"]]
     rows = list(_rows(plan, found["nets"]))
-    return "\n".join([*lines, "", table([("net", "domain", "given by", "taken by"), *rows], indent="  ", fold=True)])
+    parts = ["\n".join(lines), table([("net", "domain", "given by", "taken by"), *rows], indent="  ", fold=True)]
+    return "\n\n".join([*parts, *(f"  warning: {said}" for said in found["warnings"])])
 
 
 def _components(types: dict[str, str]) -> str:

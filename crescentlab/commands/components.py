@@ -97,7 +97,15 @@ def _declared(cls: type[Component], kind: type[State] | type[Held] | type[Observ
 
 def port_row(port: Port) -> tuple[str, str, str, str, str]:
     carried = f"signal, {_quantity(port.quantity or 'ratio')}" if port.domain is SIGNAL else port.domain.name
+    carried += f", {limits}" if (limits := signal_range(port)) else ""
     return port.name, port.role, carried, _size(port.size), port.description
+
+
+def signal_range(port: Port) -> str:
+    """``0 to 1``, ``from 0 on``: what the signal is held within; empty where it has no range."""
+    if port.low is None:
+        return "" if port.high is None else f"up to {port.high:g}"
+    return f"from {port.low:g} on" if port.high is None else f"{port.low:g} to {port.high:g}"
 
 
 def _quantity(quantity: Quantity | str) -> str:

@@ -8,7 +8,7 @@ from typing import Any
 
 from pydantic.fields import FieldInfo
 
-from crescentlab.commands.components import bounds, default, first_line, kind, listed
+from crescentlab.commands.components import bounds, default, first_line, kind, listed, signal_range
 from crescentlab.component import Component, field_quantity
 from crescentlab.domain import Held, State
 from crescentlab.fluid import Fluid
@@ -89,6 +89,9 @@ def _type(name: str, cls: type[Component] | type[Fluid]) -> dict[str, Any]:
     """The keys of one type."""
     properties: dict[str, Any] = {"type": {"const": name}}
     if issubclass(cls, Component):
+        ranges = [f"{port.name} {limits}" for port in cls.ports() if (limits := signal_range(port))]
+        if ranges:
+            properties["type"]["description"] = f"signals are held within: {', '.join(ranges)}"
         states = {d.name: d.description for form in cls.forms() for k in (State, Held) for d in form.declared(k)}
         properties["start"] = {
             "type": "object", "additionalProperties": False,

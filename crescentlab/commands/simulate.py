@@ -7,7 +7,7 @@ import json
 import logging
 import math
 import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 
 from crescentlab import plotting
-from crescentlab.balance import Balance
+from crescentlab.balance import Balance, Number
 from crescentlab.circuit import Circuit, load
 from crescentlab.cli import DONE, FAILED, INTERRUPTED
 from crescentlab.commands import arguments as shared
@@ -188,9 +188,12 @@ def _facts(result: Result) -> list[tuple[str, str]]:
 def _ledgers(balance: Balance) -> Iterator[tuple[str, str]]:
     """How well the ledgers of fluid and energy close, and where the energy went."""
 
-    def closes(what: str, circuit: float, components: dict[str, float]) -> str:
-        worst = max(components, key=lambda name: components[name])
-        return f"{what} {circuit:.1e}, at most {components[worst]:.1e} ({worst})"
+    def closes(what: str, circuit: Number, components: dict[str, Number]) -> str:
+        errors = {name: error for name, error in components.items() if error is not None}
+        worst = max(errors, key=lambda name: errors[name]) if errors else None
+        if circuit is None:
+            return f"{what} not determined: {', '.join(name for name in components if name not in errors)}"
+        return f"{what} {circuit:.1e}" + (f", at most {errors[worst]:.1e} ({worst})" if worst else "")
 
     energy, told = balance.energy, []
     if balance.components:
@@ -198,23 +201,47 @@ def _ledgers(balance: Balance) -> Iterator[tuple[str, str]]:
     if energy is not None:
         told.append(closes("of the power", energy.circuit, energy.components))
     yield "balance", "; ".join(told)
-    if merged := sum(balance.merged.values()):
+    merged = total(balance.merged.values())
+    if merged:
         yield "merged", f"{QUANTITIES['volume'].show(merged, 'cm3', 3)} moved by events"
     if energy is None:
         return
-    given, taken = (sum(e for e in energy.supplied.values() if (e > 0) == way) for way in (True, False))
-    said = [f"{_joules(given)} supplied", f"{_joules(-taken)} taken out"] if taken else [f"{_joules(given)} supplied"]
-    said += [f"{_joules(sum(energy.dissipated.values()))} to heat", f"{_joules(energy.stored)} stored"]
-    if lost := sum(energy.at_events.values()):
-        said.append(f"of it {_joules(lost)} at events")
+    taken = sum(e for e in energy.supplied.values() if e is not None and e < 0)
+    amounts: list[tuple[Number, str]] = [
+        (total(e for e in energy.supplied.values() if e is None or e > 0), "{} supplied"),
+        *([(-taken, "{} taken out")] if taken else []),
+        (total(energy.dissipated.values()), "{} to heat"),
+        (energy.stored, "{} stored"),
+    ]
+    if (lost := total(energy.at_events.values())) != 0:
+        amounts.append((lost, "of it {} at events"))
     if energy.silent:
         into = next(iter(energy.silent)) if len(energy.silent) == 1 else f"{len(energy.silent)} parts without books"
-        said.append(f"{_joules(sum(energy.silent.values()))} into {into}")
-    yield "energy", ", ".join(said)
-    hottest = sorted(energy.dissipated.items(), key=lambda item: -abs(item[1]))
-    if len(hottest) > 1:
+        amounts.append((total(energy.silent.values()), f"{{}} into {into}"))
+    shown = [text.format(_joules(amount)) for amount, text in amounts if amount is not None]
+    unknown = [text.replace("{} ", "") for amount, text in amounts if amount is None]
+    yield "energy", ", ".join(shown) + _undetermined(unknown)
+    hottest = sorted(((n, e) for n, e in energy.dissipated.items() if e is not None), key=lambda item: -abs(item[1]))
+    unknown = [name for name, amount in energy.dissipated.items() if amount is None]
+    if len(energy.dissipated) > 1 or unknown:
         more = f", {len(hottest) - MAX_HOT} more" if len(hottest) > MAX_HOT else ""
-        yield "heat", ", ".join(f"{_joules(amount)} {name}" for name, amount in hottest[:MAX_HOT]) + more
+        named = ", ".join(f"{_joules(amount)} {name}" for name, amount in hottest[:MAX_HOT])
+        yield "heat", named + more + _undetermined(unknown, "; " if named else "")
+
+
+def _undetermined(names: list[str], before: str = "; ") -> str:
+    """What of a ledger's row is no finite number."""
+    return f"{before}not determined: {', '.join(names)}" if names else ""
+
+
+def total(amounts: Iterable[Number]) -> Number:
+    """Their sum; None if one of them is not determined."""
+    known: list[float] = []
+    for amount in amounts:
+        if amount is None:
+            return None
+        known.append(amount)
+    return sum(known)
 
 
 def _joules(amount: float) -> str:

@@ -13,14 +13,12 @@ from typing import Any
 from crescentlab.cli import DONE, FAILED
 from crescentlab.commands import arguments as shared
 from crescentlab.commands.text import counted, table
-from crescentlab.errors import InputError
 from crescentlab.studies import conduct, tables
-from crescentlab.studies.planning import Planned, plan_study
-from crescentlab.studies.points import DONE as GOOD
-from crescentlab.studies.pool import LocalPool, Runner, cores
+from crescentlab.studies.planning import Planned
+from crescentlab.studies.pool import LocalPool
 from crescentlab.studies.progress import Progress, duration
+from crescentlab.studies.run_study import any_good, finish, opened, runner
 from crescentlab.studies.store import Row, Store
-from crescentlab.studies.study_file import Study
 
 MIXED = "some rows were made before crescentlab itself changed; --fresh makes all of them anew"
 
@@ -46,11 +44,8 @@ def _count(text: str) -> int:
 
 def run(options: argparse.Namespace) -> int:
     """Run the command."""
-    if options.workers and options.scheduler:
-        raise InputError("--workers is for this machine, --scheduler for a cluster; give one of them")
-    study = Study.read(Path(options.study))
-    planned = plan_study(study, no_code=options.no_code)
-    store = Store(_folder(study, options.output))
+    run_on = runner(options.workers, options.scheduler, LocalPool)
+    planned, store = opened(Path(options.study), options.output, no_code=options.no_code)
     if options.dry_run:
         return _dry_run(planned, store, options)
     store.open(planned, fresh=options.fresh)
@@ -58,54 +53,27 @@ def run(options: argparse.Namespace) -> int:
     if not options.quiet and not options.json:
         print(_beginning(planned, store, len(jobs)), file=sys.stderr)
     progress = Progress(len(jobs), options.quiet)
-
-    def runner() -> Runner:
-        if options.scheduler:
-            from crescentlab.studies.dask_runner import DaskPool
-
-            return DaskPool(options.scheduler)
-        return LocalPool(min(options.workers or cores(), len(jobs)))
-
     try:
-        conduct.conduct(planned, store, jobs, runner, progress)
+        found = finish(planned, store, jobs, run_on, progress)
     except KeyboardInterrupt:
         done = counted(sum(key in store.rows for key in planned.keys), "point")
         raise KeyboardInterrupt(f"interrupted; {done} kept in {store.folder}, the same command goes on") from None
-    rows = conduct.table(planned, store)
-    files = [*tables.write_table(store.folder, planned, rows), *_pictures(planned, rows, store.folder)]
+    rows, files = found.rows, found.files
     if options.json:
         print(json.dumps(report(planned, rows, store, len(jobs), files), indent=2, ensure_ascii=False))
     elif not options.quiet:
         print(summary(planned, rows, len(jobs), progress, files))
     if error := _error(rows):
         print(error, file=sys.stderr)
-    return DONE if _any_good(rows) else FAILED
-
-
-def _folder(study: Study, output: str | None) -> Path:
-    """Where rows are kept; the folder around it must be there."""
-    folder = conduct.results_folder(study.path, output)
-    if not folder.parent.is_dir():
-        raise InputError(f"-o {folder}: the folder {folder.parent} does not exist; make it first")
-    return folder
-
-
-def _any_good(rows: list[Row]) -> bool:
-    return any(row["status"] == GOOD for row in rows)
+    return DONE if any_good(rows) else FAILED
 
 
 def _error(rows: list[Row]) -> str | None:
     """Why a study of which nothing works failed: the first reason; None if any point is done."""
-    if _any_good(rows):
+    if any_good(rows):
         return None
     first = next((row for row in rows if row["reason"]), None)
     return "no point is done" + (f"; point {first['point']}: {first['reason']}" if first else "")
-
-
-def _pictures(planned: Planned, rows: list[Row], folder: Path) -> list[Path]:
-    from crescentlab.studies.pictures import write_pictures
-
-    return write_pictures(planned, rows, folder)
 
 
 def _beginning(planned: Planned, store: Store, todo: int) -> str:
@@ -155,7 +123,7 @@ def report(planned: Planned, rows: list[Row], store: Store, ran: int, files: lis
     """The object of ``--json``: rows in SI."""
     statuses = Counter(row["status"] for row in rows)
     return {
-        "status": "done" if _any_good(rows) else "failed", "study": planned.study.name,
+        "status": "done" if any_good(rows) else "failed", "study": planned.study.name,
         "points": len(planned.points), "ran": ran, "rows": dict(statuses),
         "units": {n: q.si for n, q in {**planned.quantities, **planned.measures}.items() if q},
         "table": [{name: _finite(v) for name, v in row.items() if name != "settings"} for row in rows],

@@ -95,13 +95,12 @@ class _CompiledRun:
         self.warnings += [notice] if (notice := self.promotion.before()) else []
         self.hybrid = Hybrid(system, values, options.start, options.stop)
         self.atol = options.rtol * system.nominal
-        self.diagnosis = Diagnosis(Functions(system, values), options.rtol, self.atol, options.solver)
-        self.limits = PressureLimits(system)
+        self.limits = PressureLimits(system, values.p)
+        self.diagnosis = Diagnosis(Functions(system, values), self.limits, options.rtol, self.atol, options.solver)
         self.storms = Storms(system)
         self.chatter = Chatter(system, values.p)
         self.chatter_at = FIRST_BLOCK
         self.chattering: str | None = None
-        self.tension: str | None = None
         self.run_ = native.Run()
         self.set_sizes()
         self.set_functions()
@@ -159,7 +158,7 @@ class _CompiledRun:
             recent=_room(r.n_events * native.LIMITS["ZENO_COUNT"]), fired=_whole(np.zeros(r.n_events)),
         )  # fmt: skip
         r.curved = hybrid.curved.size
-        r.curved_held = int(bool(r.curved) and bool(system.bits.held_dependent[hybrid.curved].any()))
+        r.curved_held = int(hybrid.anew)
         r.curved_next = self.options.start
         r.give(storm_last=self.storms.last, storm_row=self.storms.row)
         r.storm_steps, r.storm_count = STORM_STEPS, STORM_COUNT
@@ -215,7 +214,7 @@ class _CompiledRun:
         if pace is not None:
             r.n_pace = pace[0].size
             r.give(pace_t=_real(pace[0]), pace_s=_real(pace[1]))
-        floor, held_floor = self.limits.ending  # what lies below is warned of
+        floor, held_floor = self.limits.states.ending, self.limits.held.ending
         r.give(atol=_real(share * self.atol), floor=_real(floor), held_floor=_real(held_floor))
 
     def set_scratch(self) -> None:
@@ -303,6 +302,7 @@ class _CompiledRun:
         r = self.run_
         if r.curved_held:
             self.hybrid.scanned = None
+            self.hybrid.origin, self.hybrid.ticked = r.kept["origin"][: r.n_ticks], r.kept["ticked"][: r.n_ticks]
         r.curved_next = self.hybrid.next_curved_root(r.t, self.x)
         r.rescan = 0
         self.library.find_goal(ctypes.byref(r))
@@ -323,22 +323,13 @@ class _CompiledRun:
         return self.run_.kept["x"][: self.run_.n].copy()
 
     def drain(self) -> None:
-        """Take what was recorded, and look whether fluids that may were under tension, or a choice chatters."""
+        """Take what was recorded, and look whether a choice chatters."""
         block = self.records.drain()
         if block is None:
             return
         if self.run_.steps >= self.chatter_at:
             self.chatter_at *= 2
             self.chattering = self.chattering or self.chatter.look(*self.records.last(ROWS))
-        if self.tension:
-            return
-        held = block["world_h"][block["row_world"]]
-        for rows, kind in ((block["row_x"], self.limits.states), (held, self.limits.held)):
-            below = np.flatnonzero((rows < kind[1]).any(axis=1)) if any(kind[3]) else np.zeros(0, int)
-            if below.size and not self.tension:
-                k = int(below[0])
-                self.tension = self.limits.look(float(block["row_t"][k]), rows[k], *kind)
-                self.warnings += [self.tension] if self.tension else []
 
     # -- failures --------------------------------------------------------------------------------
 

@@ -7,6 +7,7 @@ from scipy import sparse
 
 from crescentlab.errors import SimulationError
 from crescentlab.solvers.functions import Functions
+from crescentlab.solvers.limits import PressureLimits
 from crescentlab.solvers.options import TIGHT
 
 IMPLICIT = ("rodas", "radau", "lsoda")
@@ -22,8 +23,11 @@ def other_solver(solver: str, rtol: float) -> str:
 class Diagnosis:
     """Names the state behind what is not finite, or behind steps that grow too short."""
 
-    def __init__(self, functions: Functions, rtol: float, atol: np.ndarray, solver: str) -> None:
-        self.functions, self.rtol, self.atol, self.solver = functions, rtol, atol, solver
+    def __init__(
+        self, functions: Functions, limits: PressureLimits, rtol: float, atol: np.ndarray, solver: str
+    ) -> None:
+        self.functions, self.limits = functions, limits
+        self.rtol, self.atol, self.solver = rtol, atol, solver
         self.system = functions.system
 
     def check_finite(self, t: float, x: np.ndarray, values: np.ndarray, when: str = "") -> None:
@@ -32,9 +36,9 @@ class Diagnosis:
         if bad.size:
             name = self.system.state_names[int(bad[0])]
             what = "is no longer a finite number" if values is x else "has a rate that is not a finite number"
+            advice = f"look at the parameters of {name.rpartition('.')[0]} and at the start values"
             raise SimulationError(
-                f"{name} {what} {when + ' ' if when else ''}(t = {t:.6g} s); "
-                f"look at the parameters of {name.rpartition('.')[0]} and at the start values"
+                f"{name} {what} {when + ' ' if when else ''}(t = {t:.6g} s); {self.beyond(t, x) or advice}"
             )
 
     def check_held(self, t: float, h: np.ndarray, names: list[str]) -> None:
@@ -46,8 +50,18 @@ class Diagnosis:
                 f"{name} was set to what is not a finite number by {', '.join(names)} (t = {t:.6g} s)"
             )
 
+    def beyond(self, t: float, x: np.ndarray) -> str | None:
+        """A pressure for which its fluid's law is not meant, and the way out that is missing; or None."""
+        return self.limits.beyond(t, x, self.functions.h, self.functions.b)
+
     def blame(self, t: float, x: np.ndarray) -> str:
-        """The state whose rate changes fastest against its tolerance, and what may help: never the solver in use."""
+        """What keeps steps from being long enough.
+
+        A pressure that has left its fluid's law behind; else the state whose rate changes fastest against its
+        tolerance, and what may help: never the solver in use.
+        """
+        if beyond := self.beyond(t, x):
+            return beyond
         f = self.functions.rhs(t, x)
         pattern = self.functions.pattern
         matrix = sparse.csc_matrix(

@@ -31,6 +31,8 @@ ZENO_COUNT = 60
 """This many firings of one event within ``ZENO_SPAN`` of the run are taken as endless."""
 ZENO_SPAN = 1e-6
 SCAN_CHUNKS, SCAN_POINTS = 40, 501
+TICK_POINTS = 25
+"""Points of a chunk that a tick cuts short: what depends on held values begins anew there."""
 """A run is scanned for curved time roots in chunks of this many points."""
 SCAN_SWING = 0.25
 """Between two points a relation moves by no more than this share of its range in the chunk; else it is made shorter."""
@@ -85,6 +87,8 @@ class Hybrid:
         self.watched = np.flatnonzero(system.bits.on_state)
         self.curved = np.flatnonzero(system.bits.on_time & ~system.bits.linear)
         self.linear = np.flatnonzero(system.bits.linear)
+        self.anew = bool(self.curved.size) and bool(system.bits.held_dependent[self.curved].any())
+        """Whether relations that curve in time change with held values and bits."""
         self.curved_roots: list[float] = []
         self.following = [(f.places, f.schedule(start, stop)) for f in values.following]
         self.chunk = self.span / SCAN_CHUNKS
@@ -255,17 +259,13 @@ class Hybrid:
         for k in fired:
             event = self.system.events[k]
             if event.kind == "fail":
-                names = event.message_names
-                values: np.ndarray | list[float] = (
-                    self.system.series(names, np.array([t]), x[None], self.h[None], self.b[None], self.p).ravel()
-                    if names
-                    else []
-                )
-                shown = {
-                    n.rpartition(".")[2]: q.show(float(v), DISPLAY.get(q.name, "" if q.si == "1" else None))
-                    for n, v in zip(names, values, strict=True)
-                    for q in [self.system.find(n).quantity]
-                }
+                world = np.array([t]), x[None], self.h[None], self.b[None], self.p
+                shown: dict[str, str | list[str]] = {}
+                for name in event.message_names:
+                    variable, values = self.system.find(name), self.system.series([name], *world).ravel()
+                    unit = DISPLAY.get(variable.quantity.name, "" if variable.quantity.si == "1" else None)
+                    each = [variable.quantity.show(float(value), unit) for value in values]
+                    shown[name.rpartition(".")[2]] = each if variable.vector else each[0]
                 raise SimulationError(event.message.format(**shown))
 
     def raise_unsettled(self, relation: str) -> NoReturn:
@@ -319,11 +319,14 @@ class Hybrid:
 
     def rescan(self) -> None:
         """Forget the roots of relations on time where they may have changed with held values and bits."""
-        if self.curved.size and self.bits_info.held_dependent[self.curved].any():
+        if self.anew:
             self.scanned = None
 
     def next_curved_root(self, t: float, x: np.ndarray) -> float:
-        """Earliest root after ``t`` of the relations that curve in time, or infinity; scans as far as needed."""
+        """Earliest root after ``t`` of the relations that curve in time, or infinity; scans as far as needed.
+
+        Relations that depend on held values are scanned up to the next tick, which may change them.
+        """
         if not self.curved.size:
             return np.inf
         if self.scanned is None:
@@ -331,16 +334,19 @@ class Hybrid:
         while True:
             while self.curved_roots and self.curved_roots[0] <= t + self.time_tolerance:
                 self.curved_roots.pop(0)
-            if self.curved_roots or self.scanned >= self.end:
-                return self.curved_roots[0] if self.curved_roots else np.inf
+            until = min(self.end, self.next_tick()) if self.anew else self.end
+            if self.curved_roots or self.scanned >= until - self.time_tolerance:
+                return self.curved_roots[0] if self.curved_roots else until if until < self.end else np.inf
             self.curved_roots, self.scanned = self.scan(self.scanned, x)
 
     def scan(self, start: float, x: np.ndarray) -> tuple[list[float], float]:
         """The next roots of relations that curve in time, found on a grid and closed in on; until when it looked."""
         prepared = self.system.relation
         while True:
-            end = min(self.end, start + self.chunk)
-            times = np.linspace(start, end, SCAN_POINTS)
+            end, points = min(self.end, start + self.chunk), SCAN_POINTS
+            if self.anew and (tick := self.next_tick()) < end:
+                end, points = tick, TICK_POINTS
+            times = np.linspace(start, end, points)
             columns = prepared.function(
                 times.reshape(1, -1), x, self.h, self.b, np.zeros(x.size), prepared.parameters(self.p)
             )
@@ -349,9 +355,9 @@ class Hybrid:
             if np.all(swing <= SCAN_SWING * np.ptp(g, axis=1) + EPS * np.abs(g).max(axis=1)):
                 self.chunk = min(2 * self.chunk, self.span / SCAN_CHUNKS)
                 break
-            if self.chunk <= self.span / SCAN_CHUNKS * SHORTEST_SCAN:
+            if end - start <= self.span / SCAN_CHUNKS * SHORTEST_SCAN:
                 break
-            self.chunk /= 4
+            self.chunk = min(self.chunk, end - start) / 4
         found: list[float] = []
         for row, k in enumerate(self.curved):
             for j in np.flatnonzero(np.sign(g[row, 1:]) != np.sign(g[row, :-1])):

@@ -7,6 +7,7 @@ from dataclasses import replace
 
 from crescentlab.errors import CompilerError
 from crescentlab.solvers import compiled, loop
+from crescentlab.solvers.limits import PressureLimits
 from crescentlab.solvers.options import TIGHT, Options
 from crescentlab.solvers.snapshot import Snapshot
 from crescentlab.solvers.trajectory import Trajectory
@@ -29,6 +30,14 @@ def integrate(
     the compiled loop, it is begun anew with ``rodas``: what decides is a count of steps, not a time, so that the same
     run goes the same way again.
     """
+    done = _integrated(system, values, options, progress, start)
+    done.warnings += PressureLimits(system, values.p).warnings(done.steps)
+    return done
+
+
+def _integrated(
+    system: System, values: Values, options: Options, progress: Progress, start: Snapshot | None
+) -> Trajectory:
     if start is not None:
         options, values = replace(options, start=start.t), start.values(values)
     if options.solver in INSTEAD:

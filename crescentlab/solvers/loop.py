@@ -80,7 +80,8 @@ class _Run:
         self.hybrid = Hybrid(system, values, options.start, options.stop, self.promotion.take)
         self.roots = RootFinder(self.hybrid)
         self.atol = options.rtol * system.nominal
-        self.diagnosis = Diagnosis(self.functions, options.rtol, self.atol, options.solver)
+        self.limits = PressureLimits(system, values.p)
+        self.diagnosis = Diagnosis(self.functions, self.limits, options.rtol, self.atol, options.solver)
         self.stepper: Stepper = stepper(options.solver, self.functions, options.rtol, self.atol)
         self.statistics = Statistics()
         self.steps = Recording()
@@ -90,7 +91,6 @@ class _Run:
         self.happenings: list[Happening] = []
         self.ticks = {event.name for event in system.events if event.kind == "every"}
         self.angles = [k for k, q in enumerate(system.state_quantities) if q is units.angle]
-        self.limits = PressureLimits(system)
         self.storms = Storms(system)
         self.chatter = Chatter(system, values.p)
         self.chatter_at = FIRST_COUNT
@@ -100,8 +100,6 @@ class _Run:
         self.pace = clock_pace(system, values, options.start, options.stop)
         self.tiny = 0
         self.shown_at = 0.0
-        self.tension: str | None = None
-        """The first warning of a fluid under tension; every later step would only repeat it."""
         self.give_up: Callable[[], bool] | None = None
         self.count_at = FIRST_COUNT
 
@@ -378,13 +376,10 @@ class _Run:
         """Refuse impossible pressures at the end of a step, or at the event that ends it sooner."""
         x = x_high if end >= self.stepper.t else np.array(self.stepper.interpolant()(end))
         try:
-            warning = self.limits.check(end, x, self.hybrid.h)
+            self.limits.check(end, x, self.hybrid.h)
         except SimulationError:
             self.keep_possible(low, end)
             raise
-        if warning and not self.tension:
-            self.tension = warning
-            self.warnings.append(warning)
 
     def keep_possible(self, low: float, high: float) -> None:
         """Record the last instant of a step at which all pressures were possible."""

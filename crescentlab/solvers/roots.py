@@ -92,7 +92,7 @@ PERIODIC = (ca.OP_SIN, ca.OP_COS, ca.OP_TAN, ca.OP_FMOD)
 
 
 def waves(system: System) -> list[int]:
-    """Relations with a periodic function of the states, such as the teeth of a wheel: cos(z phi) > 0.9."""
+    """Relations with a periodic function of the states, such as the teeth of a wheel: cos(z phi) > 0.9; no floors."""
     found: list[int] = system.once("waves", lambda: find_waves(system))
     return found
 
@@ -107,7 +107,7 @@ def find_waves(system: System) -> list[int]:
         if op == ca.OP_INPUT:
             depends[outs[0]] = int(ins[0] == 1)
         elif op == ca.OP_OUTPUT:
-            if depends[ins[0]] == 2:
+            if depends[ins[0]] == 2 and not system.bits.floors[outs[1]]:
                 found.append(outs[1])
         else:
             most = max((depends[i] for i in ins), default=0)

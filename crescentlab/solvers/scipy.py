@@ -142,7 +142,10 @@ class Stepper:
         while True:
             solver.status = "running"
             self.set_bound(bound)
-            message = solver.step()
+            try:
+                message = solver.step()
+            except (ValueError, RuntimeError) as error:  # a matrix that is not finite, or singular
+                raise SimulationError(str(error)) from None
             if solver.status == "failed":
                 raise SimulationError(str(message))
             self.dense_output = None

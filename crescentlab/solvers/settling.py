@@ -10,10 +10,10 @@ Then, instead,
 .. math:: x_1 = x_0 + h f(t + h, x_1)
 
 is solved by Newton's method with halved steps, h up to the next bound. A step counts only if no state moved by more
-than its tolerance, so its error is below that too, and over many steps in which rates drift one way the errors add up
-to less than one tolerance more; and only if no eigenvalue of df/dx grows, since what leaves its rest slowly, from less
-than a tolerance, must be able to. Where that asks for steps not much longer than the method's own, and from time to
-time where all drifts, the method itself goes on.
+than its tolerance, what only counts up included, for that is what came in or out. So its error is below that too, and
+over many steps in which rates drift one way the errors add up to less than one tolerance more; and only if no
+eigenvalue of df/dx grows, since what leaves its rest slowly, from less than a tolerance, must be able to. Where that
+asks for steps not much longer than the method's own, and from time to time where all drifts, the method itself goes on.
 """
 
 from __future__ import annotations
@@ -54,7 +54,6 @@ class Settling(Stepper):
         self.method, self.functions, self.name = method, functions, method.name
         self.rtol, self.atol = rtol, atol
         self.step_size: float | None = None
-        self.counts = functions.system.counting_states
         self.resting = False
         self.goal = 0.0
         self.begin(0.0, np.zeros(functions.n))
@@ -96,7 +95,7 @@ class Settling(Stepper):
             if h < shortest and h < bound - t:
                 break
             after = self.solved(t, x, h)
-            moved = np.inf if after is None else (np.abs(after - x) / self.allowed(x))[~self.counts].max(initial=0.0)
+            moved = np.inf if after is None else (np.abs(after - x) / self.allowed(x)).max(initial=0.0)
             if moved <= 1:
                 break
             after, h = None, h * (0.5 if after is None else 0.7 / moved)
@@ -112,7 +111,7 @@ class Settling(Stepper):
     def watch(self, bound: float) -> None:
         """Count the method's steps in which nothing moves; those that the bound cut short say nothing."""
         self.step_size, x, t = self.method.step_size, self.method.x, self.method.t
-        if np.any((np.abs(x - self.near) > self.allowed(x))[~self.counts]):
+        if np.any(np.abs(x - self.near) > self.allowed(x)):
             self.near, self.since, self.stood = x, t, 0
         else:
             self.stood += t < bound

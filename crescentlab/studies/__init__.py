@@ -14,11 +14,11 @@ worker processes, on this machine or on a Dask cluster; every point becomes a ro
     worker, pool   processes that run points, killed when they take too long; dask_runner: the same on a cluster
     provenance     hashes of the circuit and of the library, versions
     store          rows on disk: a journal, Parquet parts, the manifest
-    conduct        Planned + store -> what is missing, run; the table
+    conduct        Planned + store -> what is missing, run; the table; run_study: all of it, for command and Python
     tables, pictures (on drawing), progress
 
     fit_file, fit_problem             FIT.yaml and its data -> a problem; fit_scales: logarithms and bounds
     fit_model, fitting                its residuals and derivatives; the searches
     identifiability, fit_linearity    what cannot be told apart; where standard errors hold
-    fit_advice, fit_report, fit_pictures
+    fit_advice, fit_report, fit_pictures; run_fit: all of it, for Python
 """

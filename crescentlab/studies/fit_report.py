@@ -42,6 +42,19 @@ class Fit:
     """Why derivatives are not exact; empty where they are."""
 
     @property
+    def parameters(self) -> dict[str, float]:
+        """What was found, SI, by name."""
+        return {p.name: float(v) for p, v in zip(self.problem.parameters, self.fitted.theta, strict=True)}
+
+    def __repr__(self) -> str:
+        """What was found, in the units of the file."""
+        values = self.parameters
+        shown = ", ".join(f"{p.name} {p.quantity.show(values[p.name], p.unit)}" for p in self.problem.parameters)
+        rows = self.problem.data.measured.size
+        more = f", {len(self.warnings)} warnings" if self.warnings else ""
+        return f"<Fit {self.problem.title!r}: {shown}; {rows} measured values, {self.runs} runs{more}>"
+
+    @property
     def residuals(self) -> np.ndarray:
         """(measured - computed) / sigma, shape (m,); NaN where the run failed."""
         return np.asarray((self.problem.data.measured - self.fitted.computed) / self.fitted.sigma)

@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import Any
 
 from crescentlab.analysis.outcome import Outcome
+from crescentlab.analysis.reach import structure
 from crescentlab.circuit import Circuit, load
 from crescentlab.elaborate import Design
 from crescentlab.errors import InputError, UnitError, nearest
@@ -110,13 +111,11 @@ def plan_study(study: Study, *, no_code: bool = False) -> Planned:
     base = _tried(study, circuit, study.sections.settings)
     quantities = {name: _quantity(study, base, name, named[name]) for name in named}
     made = points(study, quantities.__getitem__)
-    first = {**study.sections.settings, **made[0].settings}
-    design = _tried(study, circuit, first)
-    measures = _measures(study, circuit, design, first)
-    _check_times(study, circuit, design)
+    measures = _measures_anywhere(study, circuit, base, made)
+    _check_times(study, circuit, base, made)
     _check_plots(study, {**quantities, **measures})
     display = {**DISPLAY, **circuit.netlist.sections.display}
-    return Planned(study, path, no_code, made, quantities, measures, provenance.Source.of(path, design), display)
+    return Planned(study, path, no_code, made, quantities, measures, provenance.Source.of(path, base), display)
 
 
 def _tried(study: Study, circuit: Circuit, settings: Mapping[str, str]) -> Design:
@@ -149,6 +148,28 @@ def _quantity(study: Study, design: Design, name: str, path: tuple[str, ...]) ->
         raise error.at(study.place(*path)) from None
 
 
+def _measures_anywhere(study: Study, circuit: Circuit, base: Design, made: list[Point]) -> dict[str, Quantity]:
+    """Quantities of the outcomes, in the circuit as it is, or at the first point where they are known.
+
+    A structure that varies brings variables of its own. Whether a point works is no matter of the study: it is a row.
+    """
+    try:
+        return _measures(study, circuit, base, study.sections.settings)
+    except InputError as error:
+        refused = error
+    structures = {structure(base)}
+    for point in made:
+        settings = {**study.sections.settings, **point.settings}
+        try:
+            design = circuit.design(settings)
+            if structure(design) not in structures:
+                structures.add(structure(design))
+                return _measures(study, circuit, design, settings)
+        except InputError:
+            continue
+    raise refused
+
+
 def _measures(study: Study, circuit: Circuit, design: Design, settings: Mapping[str, str]) -> dict[str, Quantity]:
     """Quantities of the outcomes; refuses wrong names, units and functions."""
     system = circuit.system(settings)
@@ -170,7 +191,7 @@ def _measures(study: Study, circuit: Circuit, design: Design, settings: Mapping[
     return found
 
 
-def _check_times(study: Study, circuit: Circuit, design: Design) -> None:
+def _check_times(study: Study, circuit: Circuit, design: Design, made: list[Point]) -> None:
     run = study.sections.run
     texts = {("run", name): getattr(run, name) for name in ("stop", "window", "period")}
     texts["run", "until", "every"] = run.until.every if run.until is not None else None  # type: ignore[index]
@@ -180,11 +201,36 @@ def _check_times(study: Study, circuit: Circuit, design: Design) -> None:
         try:
             seconds(text, design)
         except InputError as error:
-            raise type(error)(f"{'.'.join(path)}: {error.message}", study.place(*path)) from None
+            if not _may_be_time(text, design):
+                raise type(error)(f"{'.'.join(path)}: {error.message}", study.place(*path)) from None
+    _check_window(study, circuit, design, made)
+
+
+def _check_window(study: Study, circuit: Circuit, design: Design, made: list[Point]) -> None:
+    """Refuse a window that is longer than the run, in the circuit as it is and at every point that it accepts."""
+    run, own = study.sections.run, circuit.netlist.sections.simulation.stop
     try:
-        check_window(run, design, circuit.netlist.sections.simulation.stop)
+        check_window(run, design, own)
+        return
     except InputError as error:
-        raise InputError(f"run.window: {error.message}", study.place("run", "window")) from None
+        refused = InputError(f"run.window: {error.message}", study.place("run", "window"))
+    for point in made if any(text is not None and is_expression(text) for text in (run.window, run.stop)) else ():
+        try:
+            check_window(run, circuit.design({**study.sections.settings, **point.settings}), own)
+            return
+        except InputError:
+            continue
+    raise refused
+
+
+def _may_be_time(text: str, design: Design) -> bool:
+    """Whether an expression gives a time for other values of the parameters: a point that it fails at is then a row."""
+    own = design.parameters[""]
+    other = {n: v if isinstance(v.value, str) else replace(v, value=1.0 + k) for k, (n, v) in enumerate(own.items())}
+    try:
+        return is_expression(text) and seconds(text, replace(design, parameters={"": other})) > 0
+    except InputError:
+        return False
 
 
 def _check_plots(study: Study, columns: Mapping[str, Quantity | None]) -> None:

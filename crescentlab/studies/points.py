@@ -163,6 +163,7 @@ def _simulate(circuit: Circuit, job: Job, design: Design) -> _Ran:
     run = job.run
     if run.until is not None:
         return _until(circuit, job, design, run.until)
+    check_window(run, design, circuit.netlist.sections.simulation.stop)
     stop = None if run.stop is None else seconds(run.stop, design)
     result = circuit.simulate(stop, job.settings, max_step=run.max_step, check=False, **_options(run))
     steps = result.trajectory.statistics.steps

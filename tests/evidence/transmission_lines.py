@@ -18,7 +18,8 @@ from crescentlab.components.transmission_lines import (
     TransmissionLineTakesTakes,
 )
 
-from crescentlab.domain import Held
+from crescentlab.domain import Held, State
+from crescentlab.maths import Event, Failure
 from crescentlab.symbols import Sym
 from evidence import Number, evidence
 
@@ -45,8 +46,8 @@ class Ticked:
     def __init__(self, kind: str, fluid: SimpleOil, at_a: Given, at_b: Given, **values: Any) -> None:
         self.line: Any = FORMS[kind](**values)
         self.names, self.given = (f"{kind[0]}_a", f"{kind[1]}_b"), (at_a, at_b)
-        self.world: dict[str, Any] = {"into_a": np.zeros(1), "into_b": np.zeros(1)}
-        scalars = {"into_a", "into_b"}
+        self.world: dict[str, Any] = {item.name: np.zeros(1) for item in self.line.declared(State)}
+        scalars = set(self.world)
         for item in self.line.declared(Held):
             self.world[item.name] = self.line.start_of(item, fluid)
             scalars |= set() if item.size else {item.name}
@@ -54,6 +55,7 @@ class Ticked:
         symbols |= {n: _symbol(n, ()) for n in (*self.names, "t")}
         returned = self.line.equations(**symbols, fluid=fluid)
         tick = returned.pop("tick_over")
+        returned = {n: value for n, value in returned.items() if not isinstance(value, (Event, Failure))}
         self.dt = float(ca.evalf(Sym.of(tick.dt).sx))
         self._order = list(symbols)
         self._seen = _compiled(symbols, returned)

@@ -4,7 +4,9 @@ r"""Energy through the parts of a circuit: which of them the run is about, and w
 
 A_i [J] the activity of component i; e f the power into it at each port: p q (pressure above the atmosphere times flow
 at 0 bar gauge), f v, torque omega, and of a chamber p dV/dt. A part that hands on what it takes, like a gear set
-without losses, has little activity of its own. Integrated on the Gauss nodes of the run's own polynomials.
+without losses, has little activity of its own. Neither has the mass of a load that is lifted: what counts there is
+what passes on from one neighbour to another at the nets where it gives the motion,
+\tfrac12 \sum_{members} \int |e f| dt. Integrated on the Gauss nodes of the run's own polynomials.
 Source: L. S. Louca, J. L. Stein, G. M. Hulbert, J. K. Sprague, Proper model generation: an energy-based methodology,
 Proc. Int. Conf. Bond Graph Modeling (ICBGM), Phoenix (1997) 44-49.
 """
@@ -31,11 +33,28 @@ def activities(result: Result) -> dict[str, float]:
     """Activity [J] of every component that has a port with power, largest first."""
     system = result.system
     names, function = system.once("powers", lambda: _powers(system))
+    total = _integrated(result, names, function)
+    order = np.argsort(-total, kind="stable")
+    return {names[k]: float(total[k]) for k in order}
+
+
+def passed_on(result: Result) -> dict[str, float]:
+    """Energy [J] that passes at the nets where a component gives the motion, by component."""
+    system = result.system
+    givers, function = system.once("powers of nets", lambda: _passing(system))
+    found: dict[str, float] = {}
+    for giver, energy in zip(givers, _integrated(result, givers, function), strict=True):
+        found[giver] = found.get(giver, 0.0) + float(energy) / 2
+    return found
+
+
+def _integrated(result: Result, names: list[str], function: ca.Function) -> Array:
+    """Integrals of the magnitudes of powers, one per name, over the run [J]."""
     pieces = result.trajectory.pieces
     low, high = np.asarray(pieces.low, float), np.asarray(pieces.high, float)
     total = np.zeros(len(names))
     if not names or not low.size:
-        return dict.fromkeys(names, 0.0)
+        return total
     h, b = np.asarray(pieces.h), np.asarray(pieces.b)
     for begin in range(0, low.size, MOST_TIMES):
         some = np.arange(begin, min(begin + MOST_TIMES, low.size))
@@ -45,8 +64,7 @@ def activities(result: Result) -> dict[str, float]:
             x = pieces.at(some, t)
             power = np.asarray(function(t.reshape(1, -1), x.T, h[some].T, b[some].T, result.values.p))
             total += weight * (np.abs(power) @ length)
-    order = np.argsort(-total, kind="stable")
-    return {names[k]: float(total[k]) for k in order}
+    return total
 
 
 def indices(found: dict[str, float]) -> dict[str, float]:
@@ -65,6 +83,24 @@ def _powers(system: System) -> tuple[list[str], ca.Function]:
             names.append(name)
             powers.append(sum((_power(system, name, port) for port in ports), ca.SX(0)))
     return names, ca.Function("P", system.arguments, [ca.densify(ca.vertcat(*powers))])
+
+
+def _passing(system: System) -> tuple[list[str], ca.Function]:
+    """For each member of each net of motion the component that gives there; the function of the members' powers."""
+    givers: list[str] = []
+    powers: list[ca.SX] = []
+    for net in system.plan.graph.nets:
+        giver = system.plan.givers[net.name]
+        if giver is None or net.domain not in (TRANSLATIONAL, ROTATIONAL):
+            continue
+        for member in net.members:
+            if type(system.plan.components[member.instance]).port_named(member.port.name).role == "reads":
+                continue
+            names = (f"{member.instance}.{member.port.name}.{v}" for v in POWER[net.domain])
+            across, through = (system.find(name).expression()[member.element] for name in names)
+            givers.append(giver.instance)
+            powers.append(across * through)
+    return givers, ca.Function("P", system.arguments, [ca.densify(ca.vertcat(*powers))])
 
 
 def _power(system: System, name: str, port: Port) -> ca.SX:

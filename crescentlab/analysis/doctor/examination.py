@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 
 from crescentlab import arguments
-from crescentlab.analysis.doctor.activity import activities, indices
+from crescentlab.analysis.doctor.activity import activities, indices, passed_on
 from crescentlab.analysis.doctor.line_errors import LineError, line_errors
 from crescentlab.analysis.doctor.run_modes import RunModes, run_modes
 from crescentlab.analysis.linear.modes import Mode
@@ -40,6 +40,8 @@ STABLE = 3.0
 """Largest |s| h of an explicit method: about where RK45 ends on the real axis."""
 STIFF = 3.0
 """A circuit is called stiff if stability would make an explicit method take this many times as many steps."""
+IMPLICIT = ("rodas", "radau", "lsoda")
+"""Implicit methods, the first to try first."""
 RINGS = 0.1
 """Damping ratio below which a mode rings on."""
 ENOUGH = 0.99
@@ -73,6 +75,8 @@ class Examination:
     """Held values of components that tick, which have no modes here."""
     activity: dict[str, float]
     """[J], largest first."""
+    passed_on: dict[str, float]
+    """[J], at the nets where a component gives the motion."""
     lines: tuple[LineError, ...]
 
     def __repr__(self) -> str:
@@ -84,6 +88,12 @@ class Examination:
     def index(self) -> dict[str, float]:
         """Activity index, largest first."""
         return indices(self.activity)
+
+    def without_part(self, name: str) -> bool:
+        """Whether hardly any energy stays in a component, and hardly any passes where it gives the motion."""
+        every = sum(self.activity.values())
+        index = self.index.get(name)
+        return index is not None and index < 1 - ENOUGH and self.passed_on.get(name, 0.0) < (1 - ENOUGH) * every
 
     @property
     def span(self) -> float:
@@ -145,7 +155,7 @@ def examine(
     }
     return Examination(
         result, instants, _limits(system.state_names, statistics.limited, instants[-1]), _happened(result), ticking,
-        activities(result), tuple(line_errors(result, circuit.library, seconds, bound)),
+        activities(result), passed_on(result), tuple(line_errors(result, circuit.library, seconds, bound)),
     )  # fmt: skip
 
 
@@ -216,13 +226,13 @@ def _on_limits(found: Examination) -> list[str]:
         owner = limit.state.rpartition(".")[0]
         text = f"{limit.state} limited {100 * limit.share:.0f} % of the steps"
         text += f"; its part in the circuit is {mode_text(limit.mode)}" if limit.mode else "; it only adds up"
-        index = found.index.get(owner)
         if limit.share < MUCH and not (limit.mode and 0 < limit.mode.damping_ratio < RINGS):
             continue
         if limit.mode and 0 < limit.mode.damping_ratio < RINGS:
             text += ", which rings on: friction or leakage that the model leaves out would let the steps grow"
-        if index is not None and index < (1 - ENOUGH):
-            text += f"; {owner} has {100 * index:.2g} % of the activity: does the run need it in this detail?"
+        if found.without_part(owner):
+            share = 100 * found.index[owner]
+            text += f"; {owner} has {share:.2g} % of the activity: does the run need it in this detail?"
         said.append(text)
     return said
 
@@ -233,14 +243,18 @@ def _on_stiffness(found: Examination) -> list[str]:
         return []
     fastest = found.stiffest.mode(int(found.stiffest.limiting[0]))
     who = next(iter(fastest.parts))
+    used = found.result.trajectory.solver.split()[0].rstrip(":")
+    own = {used, found.result.design.netlist.sections.simulation.solver}
+    asked = f"{who} ({mode_text(fastest)})"
     if found.stiff:
+        others = " or ".join([name for name in IMPLICIT if name not in own][:2])
         return [
-            f"the circuit is stiff: {who} ({mode_text(fastest)}) would make an explicit method take about "
-            f"{found.explicit_steps:.0f} steps where rodas took {steps}; use --solver rodas or bdf"
+            f"the circuit is stiff: {asked} would make an explicit method take about {found.explicit_steps:.0f} steps "
+            f"where {used} took {steps}; implicit methods suit it, --solver {others} as well"
         ]
     return [
-        f"the circuit is not stiff: its fastest mode ({who}, {mode_text(fastest)}) asks for about "
-        f"{found.explicit_steps:.0f} steps of an explicit method, rodas took {steps}; --solver dopri may be faster"
+        f"the circuit is not stiff: its fastest mode, {asked}, asks for about {found.explicit_steps:.0f} steps of an "
+        f"explicit method, {used} took {steps}" + ("; --solver dopri may be faster" if "dopri" not in own else "")
     ]
 
 

@@ -190,7 +190,7 @@ class _Search:
         self.nominal = np.concatenate([system.nominal[self.states], held_nominal[self.held]])
         self.scale = self.nominal.copy()
         self.anderson = Anderson(MEMORY, NOISE * options.rtol)
-        self.limits = PressureLimits(system)
+        self.limits = PressureLimits(system, values.p)
         self.periods = 0
         self.multiplier = math.nan
 

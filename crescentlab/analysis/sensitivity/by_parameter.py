@@ -113,8 +113,14 @@ def sensitivities(
     result = runs.simulate()
     shown = Window(result, *window)
     check_tones(shown, outcomes, found, reaching)
-    if method == "differences":
-        reasons: list[str | None] = ["asked for"] * len(found)
+    reasons: list[str | None]
+    if start is None and circuit.netlist.sections.simulation.start is not None:
+        if method == "exact":
+            said = "--method exact: the run begins at the operating point, which moves with the parameters"
+            raise InputError(f"{said}; write --method differences")
+        reasons = ["the run begins at the operating point, which moves with it"] * len(found)
+    elif method == "differences":
+        reasons = ["asked for"] * len(found)
     else:
         reasons = work.exact(result, snapshot_of(start, result.system) if start is not None else None)
         if check and method == "auto":

@@ -200,14 +200,14 @@ class Site:
         self.equations = equations(system, tuple(int(k) for k in np.searchsorted(self.periods, rounded)))
         self._rest = Evaluator(self.equations.function, values.p)
         self._slope = empty_matrix(self.equations.pattern)
-        self.limits = PressureLimits(system)
+        self.limits = PressureLimits(system, values.p)
         states, held = self.equations.states, self.equations.held
         self.n_x = states.size
         self.names = [system.state_names[k] for k in states] + [system.held_names[k] for k in held]
         self.quantities: list[Quantity] = [system.state_quantities[k] for k in states]
         self.quantities += [system.held_quantities[k] for k in held]
         self.nominal = np.append(system.nominal[states], [system.held_quantities[k].nominal for k in held])
-        floors = [self.limits.states[1][states], self.limits.held[1][held]]
+        floors = [self.limits.states.lowest[states], self.limits.held.lowest[held]]
         self.floors = np.concatenate(floors)
         """Lowest possible values: absolute zero of pressures, else -inf."""
         self.bound = np.full(self.nominal.size, np.inf)

@@ -30,8 +30,9 @@ from crescentlab.errors import InputError, SimulationError
 from crescentlab.result import Result
 from crescentlab.solvers.integrate import integrate
 from crescentlab.solvers.options import Options
+from crescentlab.solvers.ranges import beyond_ranges
 from crescentlab.solvers.snapshot import Snapshot
-from crescentlab.solvers.trajectory import Recording, Statistics, Trajectory
+from crescentlab.solvers.trajectory import Recording, Rows, Statistics, Trajectory
 from crescentlab.system import System, Values
 from crescentlab.units import QUANTITIES
 
@@ -64,7 +65,7 @@ class OperatingPoint:
     resting: tuple[str, ...]
     """Unknowns held fast by the mode they are in: a mass on its stop."""
     time_constant: float | None
-    """Slowest way back to the point [s]; None if not known."""
+    """Slowest way back to the point [s]; None if not known, or if there is none."""
     wall_s: float
     warnings: tuple[str, ...] = ()
     result: Result = field(init=False, repr=False)
@@ -202,6 +203,7 @@ class _Search:
             if said is not None
         ]
         warnings += self.undecided(found)
+        warnings += beyond_ranges(self.system, self.values.p, _row(self.site.snapshot(point)))
         slowest = None
         seen = stability(self.site, point, linear.active)
         if isinstance(seen, str):
@@ -239,8 +241,12 @@ class _Search:
         return one.display_unit(quantity)  # type: ignore[arg-type]
 
 
-def _one_row(system: System, values: Values, design: Design, at: Snapshot, solver: str) -> Result:
+def _row(at: Snapshot) -> Rows:
     rows = Recording()
     rows.add(at.t, at.x, at.h, at.b)
-    trajectory = Trajectory(rows.done(), None, [], Statistics(), solver, end=at)
+    return rows.done()
+
+
+def _one_row(system: System, values: Values, design: Design, at: Snapshot, solver: str) -> Result:
+    trajectory = Trajectory(_row(at), None, [], Statistics(), solver, end=at)
     return Result(system, values, design, trajectory)

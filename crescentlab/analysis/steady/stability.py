@@ -47,7 +47,7 @@ class Stability:
     undamped: Mode | None
     """A mode that swings for ever, None if none does."""
     slowest: float | None
-    """Largest time constant [s] of the modes that die away."""
+    """Largest time constant [s], where all modes die away: else a disturbance does not, and there is none."""
 
     def warnings(self) -> list[str]:
         """What a transient would do to the point."""
@@ -88,8 +88,9 @@ def stability(site: Site, point: Point, active: Array) -> Stability | str:
 
     names = [*site.system.state_names, *site.system.held_names]
     swings, dying = np.abs(exponents.imag) > rounding, exponents.real < -rounding
-    slowest = float(np.max(-1 / exponents.real[dying])) if dying.any() else None
-    return Stability(mode(exponents.real > rounding), mode((np.abs(exponents.real) <= rounding) & swings), slowest)
+    growing, undamped = mode(exponents.real > rounding), mode((np.abs(exponents.real) <= rounding) & swings)
+    lasting = growing is not None or undamped is not None or not dying.any()
+    return Stability(growing, undamped, None if lasting else float(np.max(-1 / exponents.real[dying])))
 
 
 def _partaking(matrix: Array, value: complex) -> int:
