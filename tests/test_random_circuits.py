@@ -102,7 +102,7 @@ CHECKED = settings(
 
 
 def test_60_circuits_agree(capsys: pytest.CaptureFixture[str]) -> None:
-    """Small ones, 5 ms long: 60 that count."""
+    """60 are drawn, small ones, 5 ms long; how many of them counted, and for which solver, is printed."""
     counts: Counter[str] = Counter()
 
     @settings(CHECKED, max_examples=60)
