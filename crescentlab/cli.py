@@ -19,7 +19,7 @@ DONE, BUG, WRONG_INPUT, FAILED, INTERRUPTED = 0, 1, 2, 3, 130
 
 RUN_KEYS = (
     "status", "final_time", "wall_s", "steps", "evaluations", "jacobians", "events", "ticks", "restarts", "states",
-    "balance", "warnings", "file", "error",
+    "balance", "warnings", "verify", "file", "error",
 )  # fmt: skip
 """Keys of the object that ``simulate --json`` prints, whatever happens."""
 

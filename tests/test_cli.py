@@ -405,7 +405,7 @@ def test_input_errors_name_file_and_line(
 @pytest.mark.parametrize(
     ("arguments", "said"),
     [
-        (["--stop", "5"], "write for example 5 ms"),
+        (["--stop", "5"], "a time needs a unit: 5 s"),
         (["--stop", "0 ms"], "above 0"),
         (["--stop", "5", "ms"], "quote text that has blanks"),
         (["--solver", "lsodaa"], "did you mean lsoda"),

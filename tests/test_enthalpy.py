@@ -204,7 +204,7 @@ def test_default_enthalpy_on_symbols():
 def test_the_energies_of_the_manual():
     """What a litre stores in docs/fluids.md, to the digits printed, and what a port carries, to 0.1 %."""
     page = (Path(__file__).parents[1] / "docs" / "fluids.md").read_text(encoding="utf-8")
-    section = page[page.index("## Energy") : page.index("## Several fluids")]
+    section = page[page.index("## Energy") :].split("\n## ")[0]
     head, *rows = re.findall(r"^\| (.+) \|$", section, re.MULTILINE)
     at = [float(cell.removesuffix(" bar")) * BAR for cell in head.split(" | ")[1:]]
     oil, airy = SimpleOil(**OIL), AeratedOil(**OIL, air_fraction="0.5 %", saturation_pressure="1000 bar")

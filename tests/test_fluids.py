@@ -264,7 +264,8 @@ def test_a_grade_in_a_circuit():
     made = circuit(components=parts, nets=nets, fluid=fluid, simulation={"stop": "1 s"})
     cold, hot = (made.simulate(parameters={"fluid.temperature": f"{t} degC"})["gap.q"][-1] for t in (40, 100))
     thin, thick = (MineralOil(grade="ISO VG 46", temperature=f"{t} degC", air_fraction=0.0) for t in (100, 40))
-    assert hot / cold == pytest.approx(thick.dynamic_viscosity(5 * BAR) / thin.dynamic_viscosity(5 * BAR), rel=1e-9)
+    cold_oil, hot_oil = (o.kinematic_viscosity(5 * BAR) * o.rho_0 for o in (thick, thin))  # q = b h3 dp/(12 nu l rho_0)
+    assert hot / cold == pytest.approx(cold_oil / hot_oil, rel=1e-9)
     assert hot / cold == pytest.approx(46 / 6.7 * 1.05, rel=0.01)  # 5 % of density in 60 K
     other = made.simulate(parameters={"fluid.grade": "ISO VG 68"})["gap.q"][-1]
     assert cold / other == pytest.approx(68 * 886 / (46 * 879), rel=0.01)

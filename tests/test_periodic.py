@@ -163,7 +163,7 @@ def test_a_circuit_without_a_period_asks_for_it() -> None:
         ({"tolerance": float("nan")}, "tolerance nan: write a number"),
         ({"tolerance": 2.0}, "tolerance 2: write a number"),
         ({"rtol": 5.0}, "rtol 5"),
-        ({"most": 0}, "most 0: write 5 periods or more"),
+        ({"most": 0}, "most 0: write a whole number from 5 on, for example 300"),
         ({"solver": "rodos"}, "did you mean rodas"),
         ({"period": "0 ms"}, "period: 0 ms must be above 0"),
     ],

@@ -41,8 +41,8 @@ def test_a_snippet_is_accepted_as_printed(text: str) -> None:
 
 
 def test_there_are_snippets() -> None:
-    """For what gives pressure, motion, speed and a signal, at least."""
-    assert {"capacity", "mass", "speed_source", "constant"} <= {yaml.safe_load(text)["type"] for text in snippets()}
+    """For what gives pressure, motion and speed, at least."""
+    assert {"capacity", "mass", "speed_source"} <= {yaml.safe_load(text)["type"] for text in snippets()}
 
 
 def test_the_mass_that_a_rod_asks_for_makes_the_circuit_complete() -> None:

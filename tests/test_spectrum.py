@@ -383,7 +383,7 @@ def test_a_result_file_serves_where_its_grid_fits(bench: Path, capsys: pytest.Ca
         (["wave.y", "--period", "10 ms", "--frequency", "100 Hz"], "say the same; write one of them"),
         (["wave.y", "--frequency", "0 Hz"], "must be above 0"),
         (["wave.y", "--periods", "7"], "does not hold 7 x 10 ms; simulate longer, for example --stop '80 ms'"),
-        (["wave.y", "--periods", "0"], "at least one period"),
+        (["wave.y", "--periods", "0"], "periods 0: write a whole number from 1 on"),
         (["wave.y", "--from", "55 ms"], "there are 0 periods of 10 ms; simulate longer (--stop), or begin earlier"),
         (["wave.y", "--from", "500 ms"], "--from 500 ms: the run ends at 60 ms already; simulate longer"),
         (["wave.y", "--highest", "0"], "--highest 0: a frequency has a number and a unit; write for example 5 kHz"),

@@ -73,7 +73,7 @@ class Hybrid:
         self.h = values.h0.copy()
         self.holds = np.zeros(system.conditions.numel(), bool)
         self.p = values.p
-        self.finished = self.resumed = False
+        self.finished = self.resumed = self.guess = False
         self.rising = [k for k, e in enumerate(system.events) if e.kind != "every"]
         self.ticking = [k for k, e in enumerate(system.events) if e.kind == "every"]
         self.periods = np.array(system.period(values.p)).ravel() if self.ticking else np.zeros(0)
@@ -132,13 +132,17 @@ class Hybrid:
         clocks = {"origin": self.origin, "ticked": self.ticked, "period": self.periods}
         return {"h": self.h, "b": self.b, "holds": self.holds, **clocks}
 
-    def enter(self, t: float, x: np.ndarray) -> tuple[np.ndarray, list[str]]:
+    def enter(self, t: float, x: np.ndarray, *, guess: bool = False) -> tuple[np.ndarray, list[str]]:
         """The start of a run, the same for every solver: the bits begin, then what is true fires.
 
-        Returns the state after it and the names of what fired.
+        Returns the state after it and the names of what fired. Of a ``guess`` nothing is a failure yet.
         """
         self.begin(t, x)
-        return self.stop(t, x, [], starts=not self.resumed)
+        self.guess = guess
+        try:
+            return self.stop(t, x, [], starts=not self.resumed)
+        finally:
+            self.guess = False
 
     def begin(self, t: float, x: np.ndarray) -> None:
         """Bits at the start: truth first, then settling. A resumed run has its bits and conditions already."""
@@ -256,7 +260,8 @@ class Hybrid:
         return [k for k in fired if k not in waiting]
 
     def raise_failures(self, t: float, x: np.ndarray, fired: list[int]) -> None:
-        for k in fired:
+        """Raise the message of a failure among the events that fire."""
+        for k in () if self.guess else fired:
             event = self.system.events[k]
             if event.kind == "fail":
                 world = np.array([t]), x[None], self.h[None], self.b[None], self.p

@@ -272,7 +272,7 @@ class Site:
         if start is not None:
             hybrid.resume(start)
         x = (self.values.x0 if start is None else start.x).copy()
-        x, _ = hybrid.enter(self.t, x)
+        x, _ = hybrid.enter(self.t, x, guess=start is None)
         point = self.aligned(Point(x, hybrid.h, hybrid.b, hybrid.holds))
         self.bound = RUNAWAY * self.scale(self.unknowns(point))
         return point
