@@ -36,8 +36,8 @@ LIMITS = 0.02
 """Least share of the steps for a state to be named."""
 MUCH = 0.3
 """Share of the steps from which a state is worth advice."""
-STABLE = 3.0
-"""Largest |s| h of an explicit method: about where RK45 ends on the real axis."""
+STABLE = 2.2
+"""Largest |s| h of an explicit method: RK45 is kept there, well inside its region of stability, which ends at 3.3."""
 STIFF = 3.0
 """A circuit is called stiff if stability would make an explicit method take this many times as many steps."""
 IMPLICIT = ("rodas", "radau", "lsoda")
