@@ -205,6 +205,16 @@ class System:
         return prepare("remap", [*self.arguments[:-1], fired], self.p, outputs)
 
     @functools.cached_property
+    def events_on_states(self) -> Array:
+        """Which events have a condition that a relation on states is part of, shape (events,)."""
+        found = np.zeros(len(self.events), bool)
+        rising = [k for k, event in enumerate(self.events) if event.kind != "every"]
+        watched = np.flatnonzero(self.bits.on_state).tolist()
+        if rising and watched:
+            found[rising] = ca.which_depends(self.conditions, self.b[watched], 1, True)
+        return found
+
+    @functools.cached_property
     def period(self) -> ca.Function:
         """Periods of the ticks, from p alone."""
         return ca.Function("period", [self.p], [ca.densify(self.periods)])

@@ -135,7 +135,8 @@ class Hybrid:
     def enter(self, t: float, x: np.ndarray, *, guess: bool = False) -> tuple[np.ndarray, list[str]]:
         """The start of a run, the same for every solver: the bits begin, then what is true fires.
 
-        Returns the state after it and the names of what fired. Of a ``guess`` nothing is a failure yet.
+        Returns the state after it and the names of what fired. Of a ``guess`` nothing that states bring about is a
+        failure yet.
         """
         self.begin(t, x)
         self.guess = guess
@@ -260,8 +261,10 @@ class Hybrid:
         return [k for k in fired if k not in waiting]
 
     def raise_failures(self, t: float, x: np.ndarray, fired: list[int]) -> None:
-        """Raise the message of a failure among the events that fire."""
-        for k in () if self.guess else fired:
+        """Raise the message of a failure among the events that fire; in a guess, of one that no state can mend."""
+        for k in fired:
+            if self.guess and self.system.events_on_states[k]:
+                continue
             event = self.system.events[k]
             if event.kind == "fail":
                 world = np.array([t]), x[None], self.h[None], self.b[None], self.p

@@ -34,6 +34,8 @@ MANY_STEPS = 20_000
 """So many steps of SciPy's take longer than building the compiled loop and what it then needs."""
 MANY_RESTARTS = 200
 """So many restarts at the lowest order add up: 2000 take 3e-4 off an oscillation's energy at an rtol of 1e-6."""
+MEMORY = ("lsoda", "bdf", "cvode")
+"""Methods that lose their order as they begin anew."""
 FIRST_COUNT = 1000
 """After so many steps, and every time they have doubled, those ahead are counted."""
 LOOK = 0.1
@@ -126,6 +128,11 @@ class _Run:
         if self.grid is not None and not self.grid.t:
             self.grid.add(self.steps.t[0], self.steps.x[0], self.steps.h[0], self.steps.b[0])
         layout = "" if not self.functions.n else f" ({self.stepper.name})"
+        if s.restarts > MANY_RESTARTS and self.stepper.name.startswith(MEMORY):
+            self.warnings.append(
+                f"{self.stepper.name} began anew {s.restarts} times, each time at its lowest order, and the errors "
+                "there add up beyond the tolerance: --solver rodas or radau holds it"
+            )
         return Trajectory(
             steps=self.steps.done(), grid=self.grid.done() if self.grid else None, happenings=self.happenings,
             statistics=s, solver=self.options.solver + layout, pieces=self.pieces, status=status, error=error,

@@ -15,7 +15,7 @@ TIGHT = 1e-7
 """Smaller relative tolerances are left to methods of higher order than that of rodas."""
 
 
-TOLERANCE_SHARE = {"lsoda": 0.05, "bdf": 0.02, "cvode": 0.02, "rk45": 0.2, "dopri": 0.2}
+TOLERANCE_SHARE = {"lsoda": 0.2, "bdf": 0.02, "cvode": 0.2, "rk45": 0.2, "dopri": 0.2}
 """What part of the tolerance a method works to; others to all of it. An error control holds the error of a step. Where
 little is damped, as in a line, the errors of all steps add up, and they do so by method: at one tolerance those of BDF
 to some ten times those of rodas and LSODA, since they have one sign, a damping; those of the explicit methods of order

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import logging
 
-import casadi as ca
 import numpy as np
 
 from crescentlab.system import System
@@ -23,7 +22,7 @@ class Storms:
     def __init__(self, system: System) -> None:
         self.names = [event.name for event in system.events] + list(system.bits.names)
         self.places = {name: k for k, name in enumerate(self.names[: len(system.events)])}
-        self.counted = np.concatenate((_on_states(system), system.bits.on_state & system.bits.switches))
+        self.counted = np.concatenate((system.events_on_states, system.bits.on_state & system.bits.switches))
         """Shape (events + relations,)."""
         self.last = np.full(len(self.names), -(2**62))
         """Accepted steps at the last turn."""
@@ -50,13 +49,3 @@ class Storms:
         for warning in warnings:
             log.warning("warning: %s", warning)
         return warnings
-
-
-def _on_states(system: System) -> np.ndarray:
-    """Which events have a condition that a relation on states is part of."""
-    found = np.zeros(len(system.events), bool)
-    rising = [k for k, event in enumerate(system.events) if event.kind != "every"]
-    watched = np.flatnonzero(system.bits.on_state).tolist()
-    if rising and watched:
-        found[rising] = ca.which_depends(system.conditions, system.b[watched], 1, True)
-    return found
