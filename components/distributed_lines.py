@@ -136,6 +136,20 @@ class DistributedLine(LineWall, Component):
         series = line_series(omega, self.diameter, self.roughness, fluid, p_mean, q_mean, spread)
         return two_port_of(series, self.shunt(omega, p_mean, self.diameter, fluid), self.length)
 
+    @property
+    def lumps(self) -> int:
+        """Lumps that the line is cut into: its cells."""
+        return self.cells
+
+    def wave(self, p: Any, fluid: Fluid) -> tuple[Any, Any]:
+        r"""Time l/a [s] that a wave travels from end to end, and its impedance \rho_0 a/A [Pa s/m^3], at p [Pa]."""
+        speed = self.wave_speed(p, self.diameter, fluid)
+        return self.length / speed, fluid.rho_0 * speed / self._area()
+
+    def friction_drop(self, q: Any, p: Any, fluid: Fluid) -> Any:
+        """Pressure [Pa] that steady flow q [m^3/s] loses from a to b, at p [Pa]."""
+        return pipe_friction_drop(q, self.length, self.diameter, self.roughness, fluid, p, self.loss_coefficient)
+
     def inside(self, p: Expr, q: Expr, lags: Expr, at_a: Expr, at_b: Expr, fluid: Fluid) -> Equations:
         """All that the forms share, from the states and what each end receives: pressure, or flow into the line."""
         gives_a, gives_b = self.gives("a"), self.gives("b")

@@ -22,6 +22,7 @@ from crescentlab.units import Flow, Length, Pressure, PressureDifference, Ratio
 from .flow_laws import pipe_friction_drop
 from .line_energy import heat, kinetic_energy
 from .two_ports import line_series, line_shunt, two_port_of
+from .wave_laws import impedance, wave_speed
 
 
 @dataclass(frozen=True)
@@ -76,6 +77,19 @@ class Pipe(Component):
         spread = self.loss_coefficient / self.length
         series = line_series(omega, self.diameter, self.roughness, fluid, p_mean, q_mean, spread)
         return two_port_of(series, line_shunt(omega, self.diameter, fluid, p_mean), self.length)
+
+    @property
+    def lumps(self) -> int:
+        """Lumps that the line is cut into: one."""
+        return 1
+
+    def wave(self, p: Any, fluid: Fluid) -> tuple[Any, Any]:
+        r"""Time l/a [s] that a wave travels from end to end, and its impedance \rho_0 a/A [Pa s/m^3], at p [Pa]."""
+        return self.length / wave_speed(p, fluid), impedance(p, pi / 4 * self.diameter * self.diameter, fluid)
+
+    def friction_drop(self, q: Any, p: Any, fluid: Fluid) -> Any:
+        """Pressure [Pa] that steady flow q [m^3/s] loses from a to b, at p [Pa]."""
+        return pipe_friction_drop(q, self.length, self.diameter, self.roughness, fluid, p, self.loss_coefficient)
 
     def _volume(self) -> Any:
         """Volume of the bore [m^3]."""

@@ -51,6 +51,11 @@ class Step(Inferring, Component):
 
     y = gives_signal("output_quantity", "the value")
 
+    @property
+    def change_time(self) -> float:
+        """Time [s] that its change takes: none."""
+        return 0.0
+
     def equations(self, t: Expr) -> Equations:
         return {"y": event_where(t >= self.at, self.after, self.before)}
 
@@ -73,6 +78,11 @@ class Ramp(Inferring, Component):
     duration: Time = Field(gt=0, description="time the ramp takes")
 
     y = gives_signal("output_quantity", "the value")
+
+    @property
+    def change_time(self) -> float:
+        """Time [s] that its change takes."""
+        return self.duration
 
     def equations(self, t: Expr) -> Equations:
         rising = self.before + (self.after - self.before) * (t - self.at) / self.duration
@@ -184,6 +194,11 @@ class Pulse(Inferring, Component):
 
     y = gives_signal("output_quantity", "the value")
     begun = held(Time, "begin of the present pulse", start=_last_before_the_start, counts=True)
+
+    @property
+    def change_time(self) -> float:
+        """Time [s] that its changes take: none."""
+        return 0.0
 
     def equations(self, t: Expr, begun: Expr) -> Equations:
         now = (t >= begun) & (t < begun + self.width)

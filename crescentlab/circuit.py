@@ -18,6 +18,7 @@ from crescentlab import arguments, cold_start
 from crescentlab.arguments import Settings
 from crescentlab.assembly import assemble
 from crescentlab.causality import Plan, plan
+from crescentlab.coarse_lines import too_coarse
 from crescentlab.component import field_quantity
 from crescentlab.elaborate import Design, elaborate
 from crescentlab.errors import ExpressionError, InputError, SimulationError, nearest
@@ -216,6 +217,7 @@ class Circuit:
         trajectory = integrate(system, values, options, progress, begin)
         trajectory.warnings[:0] = warnings
         trajectory.warnings += beyond_ranges(system, values.p, trajectory.steps)
+        trajectory.warnings += too_coarse(system, values.p, trajectory)
         result = Result(system, values if begin is None else begin.values(values), design, trajectory)
         if trajectory.status == "failed" and begin is None:
             trajectory.error += cold_start.advice(result, options.span)

@@ -31,7 +31,7 @@ LAYERS: tuple[tuple[str, ...], ...] = (
     ("solvers",),
     ("balance",),
     ("result", "recorded", "placement", "plotting", "schematic", "verification"),
-    ("cold_start",),
+    ("cold_start", "coarse_lines"),
     ("circuit",),
     ("analysis",),
     ("studies", "report"),

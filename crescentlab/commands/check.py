@@ -11,6 +11,7 @@ from typing import Any
 
 from crescentlab.causality import Plan
 from crescentlab.circuit import load
+from crescentlab.coarse_lines import maybe_too_coarse
 from crescentlab.commands import arguments as shared
 from crescentlab.commands.text import counted, settings, table, wrapped
 from crescentlab.graph import Member, Net
@@ -63,7 +64,8 @@ def facts(plan: Plan) -> dict[str, Any]:
             f"{name}: {said}"
             for name, component in plan.components.items()
             for said in component.remarks(netlist.sections.simulation.stop)
-        ] + [f"{said}: pressures are gauge, above 1.01325 bar absolute" for said in _absolute(netlist.node)],
+        ] + [f"{said}: pressures are gauge, above 1.01325 bar absolute" for said in _absolute(netlist.node)]
+        + maybe_too_coarse(plan),
         "warnings": [*plan.design.warnings, *settings_too_high(plan)],
         "forms": {name: type(c).type_name() for name, c in plan.components.items() if name in flexible},
     }  # fmt: skip
