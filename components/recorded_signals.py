@@ -13,6 +13,7 @@ from crescentlab.component import Component, Equations, structural
 from crescentlab.data_files import DataFile, Recording, open_data, recording
 from crescentlab.domain import gives_signal, scheduled
 from crescentlab.errors import InputError
+from crescentlab.fluid import Fluid
 from crescentlab.maths import Expr, stack
 from crescentlab.schedule import Schedule
 from crescentlab.units import Time, normalise
@@ -168,7 +169,7 @@ class RecordedSignal(Component):
         course, reach = self.interpolation, (start, stop)
         return pieces(times - self.offset, values * scale[:, 0] + scale[:, 1], course, beyond, reach).schedule()
 
-    def remarks(self, stop: float) -> list[str]:
+    def remarks(self, stop: float, fluid: Fluid | None = None) -> list[str]:
         """What `check` says of a run until ``stop`` [s]."""
         if self.beyond != "slope" or not self.degree:
             return []

@@ -8,6 +8,7 @@ from pydantic import Field, model_validator
 from crescentlab import units
 from crescentlab.component import Component, Equations
 from crescentlab.domain import gives_signal, held, scheduled, takes_signal
+from crescentlab.fluid import Fluid
 from crescentlab.maths import Expr, event_where, fmod, initially, stack, when, where
 from crescentlab.schedule import Schedule
 from crescentlab.tables import Curve, CurveOf
@@ -62,7 +63,7 @@ class TimeTable(Component):
         x, y = self.curve.x, np.array(self.curve.y)
         return pieces(x, y, self.interpolation, self.beyond, (start, stop)).schedule()
 
-    def remarks(self, stop: float) -> list[str]:
+    def remarks(self, stop: float, fluid: Fluid | None = None) -> list[str]:
         """What `check` says of a run until ``stop`` [s]."""
         return extended("the table", self.curve.x, self.beyond, stop)
 

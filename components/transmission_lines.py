@@ -19,6 +19,9 @@ from .line_walls import LineWall
 from .two_ports import line_series, two_port_of
 from .vapour_cavities import CavityEnd, cavity_end, cavity_events
 
+HIGH, ALIKE = 100e5, 0.8
+"""Pressure [Pa] at which free air hardly slows waves, and the least share of their speed there told as constant."""
+
 
 def _start_waves(line: "TransmissionLine", fluid: Fluid | None, way: int) -> np.ndarray:
     """Steady waves of every cell, towards b (way 1) or a (-1): p + Z q or p - Z q, p falling from lump to lump."""
@@ -163,6 +166,26 @@ class TransmissionLine(LineWall, Component):
         spread = self.loss_coefficient / self.length
         series = line_series(omega, self.diameter, self.roughness, fluid, p_mean, q_mean, spread)
         return two_port_of(series, self.shunt(omega, p_mean, self.diameter, fluid), self.length)
+
+    def remarks(self, stop: float, fluid: Fluid | None = None) -> list[str]:
+        """What the line cannot show in this fluid: a wave speed that varies, and cavities away from its ends."""
+        if fluid is None:
+            return []
+        remarks, high = [], max(self.mean_pressure, HIGH)
+        slow, fast = (float(self.wave_speed(p, self.diameter, fluid)) for p in (0.0, high))
+        if slow < ALIKE * fast:
+            remarks.append(
+                f"its waves run at {float(self.speed(fluid)):.4g} m/s, the speed at its mean_pressure of "
+                f"{self.mean_pressure / 1e5:.4g} bar, whatever the pressure; in this fluid they run at {slow:.4g} m/s "
+                f"at 0 bar and at {fast:.4g} m/s at {high / 1e5:.4g} bar, and gas released along the line is left out; "
+                "lax_wendroff_line follows the speed"
+            )
+        if fluid.cavity_pressure is not None:
+            remarks.append(
+                f"its fluid evaporates at {float(fluid.cavity_pressure) / 1e5:.4g} bar: a cavity opens only at an end "
+                "that gives its pressure, cavities inside the line are left out; distributed_line shows them"
+            )
+        return remarks
 
     def speed(self, fluid: Fluid) -> Any:
         """a [m/s], constant."""

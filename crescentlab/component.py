@@ -142,8 +142,11 @@ class Component(BaseModel):
             raise ComponentError(f"{type(self).__name__}: size {value!r} is not a whole number from 0")
         return int(value)
 
-    def remarks(self, stop: float) -> list[str]:
-        """Sentences that `check` adds about this part in a run until ``stop`` [s]; a class says what is worth one."""
+    def remarks(self, stop: float, fluid: Any = None) -> list[str]:
+        """Sentences that `check` adds about this part in a run until ``stop`` [s]; a class says what is worth one.
+
+        ``fluid`` is the one in it, of several the first; None without one or where the circuit around names it.
+        """
         return []
 
     def quantity(self, quantity: Quantity | str) -> Quantity:

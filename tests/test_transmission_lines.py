@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import itertools
 import math
+import re
 from typing import Any
 
 import numpy as np
@@ -16,6 +17,7 @@ from crescentlab.components.transmission_lines import TransmissionLine, Transmis
 from evidence.transmission_lines import FORMS, Ticked
 
 from crescentlab.analysis.linear.frequency import frequency_response
+from crescentlab.commands.check import facts
 from crescentlab.errors import InputError, SimulationError
 
 THIN = SimpleOil(density=870.0, kinematic_viscosity=1e-12, bulk_modulus=1.6e9)
@@ -352,3 +354,47 @@ def test_without_vapour_the_run_ends(solver: str) -> None:
     assert result["end.p"].min() >= -1.01326e5
     tense = separating({**TEXT, "tension": "true"}, flow).simulate(solver=solver)
     assert tense["end.p"].min() == pytest.approx(-3.7e5, rel=0.02)
+
+
+# -- what `check` says ---------------------------------------------------------------------------
+
+AERATED = {"type": "aerated_oil", "density": "870 kg/m^3", "kinematic_viscosity": "46 cSt", "bulk_modulus": "1.6 GPa",
+           "air_fraction": "0.5 %", "saturation_pressure": "1000 bar"}  # fmt: skip
+
+
+def remarks_in(fluid: dict[str, str]) -> list[str]:
+    """What `check` adds on a line of 200 bar in this fluid."""
+    parts = {
+        "source": {"type": "pressure_source", "pressure": "200 bar"},
+        "line": {"type": "transmission_line", "length": "10 m", "diameter": "10 mm", "mean_pressure": "200 bar"},
+        "end": {"type": "plug"},
+    }
+    nets = {"n1": ["source.port", "line.a"], "n2": ["line.b", "end.port"]}
+    said: list[str] = facts(circuit(components=parts, nets=nets, fluid=fluid).system().plan)["remarks"]
+    return said
+
+
+def test_check_tells_of_a_wave_speed_that_varies() -> None:
+    """At 0 bar gauge by hand: rho = 0.995 870, beta = 1/((1 - alpha)/beta_l + alpha (1/(n P) + 1/(P_s - P))).
+
+    a = sqrt(beta/rho): isothermal-to-adiabatic free air (n = 1.4) in a liquid, Wood's formula.
+    """
+    P, alpha = 101325.0, 0.005
+    beta = 1 / ((1 - alpha) / 1.6e9 + alpha * (1 / (1.4 * P) + 1 / (1000e5 - P)))
+    (said,) = remarks_in(AERATED)
+    assert said.startswith("line: its waves run at ")
+    assert "mean_pressure of 200 bar" in said
+    assert "lax_wendroff_line" in said
+    slow = re.search(r"they run at ([\d.]+) m/s at 0 bar", said)
+    assert slow is not None
+    assert float(slow[1]) == pytest.approx(math.sqrt(beta / (0.995 * 870)), rel=2e-3)
+
+
+def test_check_tells_that_cavities_inside_the_line_are_left_out() -> None:
+    """Vapour pressure 0.1 bar absolute is 0.1 - 1.01325 bar gauge; without vapour and air there is nothing to tell."""
+    evaporating = TEXT | {"type": "cavitating_oil", "vapour_pressure": "0.1 bar"}
+    (said,) = remarks_in(evaporating)
+    assert "evaporates at -0.9133 bar" in said
+    assert "cavities inside the line are left out" in said
+    assert len(remarks_in(evaporating | {"air_fraction": "0.5 %", "saturation_pressure": "1000 bar"})) == 2
+    assert remarks_in(TEXT) == []

@@ -14,6 +14,7 @@ from crescentlab.circuit import load
 from crescentlab.coarse_lines import maybe_too_coarse
 from crescentlab.commands import arguments as shared
 from crescentlab.commands.text import counted, settings, table, wrapped
+from crescentlab.fluid import Fluid
 from crescentlab.graph import Member, Net
 from crescentlab.pressures import settings_too_high
 from crescentlab.units import gauge_of
@@ -63,12 +64,17 @@ def facts(plan: Plan) -> dict[str, Any]:
         "remarks": [
             f"{name}: {said}"
             for name, component in plan.components.items()
-            for said in component.remarks(netlist.sections.simulation.stop)
+            for said in component.remarks(netlist.sections.simulation.stop, _fluid_of(plan, name))
         ] + [f"{said}: pressures are gauge, above 1.01325 bar absolute" for said in _absolute(netlist.node)]
         + maybe_too_coarse(plan),
         "warnings": [*plan.design.warnings, *settings_too_high(plan)],
         "forms": {name: type(c).type_name() for name, c in plan.components.items() if name in flexible},
     }  # fmt: skip
+
+
+def _fluid_of(plan: Plan, name: str) -> Fluid | None:
+    """The fluid in a component; of several the first, None where there is none or the circuit around names it."""
+    return next((plan.design.fluids.get(fluid) for fluid in plan.fluids[name].values()), None)
 
 
 def _absolute(node: Node) -> list[str]:
