@@ -219,8 +219,8 @@ class Circuit:
         trajectory.warnings[:0] = warnings
         trajectory.warnings += beyond_ranges(system, values.p, trajectory.steps)
         trajectory.warnings += too_coarse(system, values.p, trajectory)
-        if trajectory.status == "failed" and (other := ringing(system, values.p, trajectory)):
-            trajectory.error = trajectory.error.replace(CAVITATES, other)
+        if trajectory.status == "failed" and (instead := ringing(system, values.p, trajectory)):
+            trajectory.error = trajectory.error.replace(CAVITATES, instead)
         result = Result(system, values if begin is None else begin.values(values), design, trajectory)
         if trajectory.status == "failed" and begin is None:
             trajectory.error += cold_start.advice(result, options.span)
