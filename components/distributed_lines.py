@@ -141,6 +141,11 @@ class DistributedLine(LineWall, Component):
         """Lumps that the line is cut into: its cells."""
         return self.cells
 
+    @property
+    def places(self) -> np.ndarray:
+        """Where the pressures are, as shares of the length from a."""
+        return np.asarray(((0.0 if self.gives("a") else 0.5) + np.arange(self.pressures)) * self.cell / self.length)
+
     def wave(self, p: Any, fluid: Fluid) -> tuple[Any, Any]:
         r"""Time l/a [s] that a wave travels from end to end, and its impedance \rho_0 a/A [Pa s/m^3], at p [Pa]."""
         speed = self.wave_speed(p, self.diameter, fluid)

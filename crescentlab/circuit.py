@@ -18,7 +18,7 @@ from crescentlab import arguments, cold_start
 from crescentlab.arguments import Settings
 from crescentlab.assembly import assemble
 from crescentlab.causality import Plan, plan
-from crescentlab.coarse_lines import too_coarse
+from crescentlab.coarse_lines import ringing, too_coarse
 from crescentlab.component import field_quantity
 from crescentlab.elaborate import Design, elaborate
 from crescentlab.errors import ExpressionError, InputError, SimulationError, nearest
@@ -28,6 +28,7 @@ from crescentlab.graph import build
 from crescentlab.library import Library, installed
 from crescentlab.netlist import SMALLEST_RTOL, Netlist, SimulationSection
 from crescentlab.plotting import check_plots
+from crescentlab.pressures import CAVITATES
 from crescentlab.recorded import Recorded, read
 from crescentlab.result import Result
 from crescentlab.solvers.options import Options
@@ -218,6 +219,8 @@ class Circuit:
         trajectory.warnings[:0] = warnings
         trajectory.warnings += beyond_ranges(system, values.p, trajectory.steps)
         trajectory.warnings += too_coarse(system, values.p, trajectory)
+        if trajectory.status == "failed" and (instead := ringing(system, values.p, trajectory)):
+            trajectory.error = trajectory.error.replace(CAVITATES, instead)
         result = Result(system, values if begin is None else begin.values(values), design, trajectory)
         if trajectory.status == "failed" and begin is None:
             trajectory.error += cold_start.advice(result, options.span)

@@ -12,6 +12,7 @@ Source: Wylie & Streeter, Fluid Transients in Systems (1993), sections 3-1 and 3
 
 from __future__ import annotations
 
+import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 from math import ceil
@@ -38,6 +39,10 @@ PER_CHANGE = 10
 """Cells that a change should take to pass an end."""
 MOST_CELLS = 100
 """Lines of more cells are not worth it."""
+REFLECTIONS = 2
+"""Of waves, that are followed back from a cell below absolute zero."""
+BELOW_ZERO = re.compile(r"(?P<line>\S+)\.p_node\[(?P<node>\d+)\] is .* below absolute zero")
+"""What a run says that ends in a cell below absolute zero."""
 MOST_ROWS = 200_000
 """Of a run that are looked at."""
 
@@ -135,8 +140,7 @@ def _miss(system: System, p: Array, trajectory: Trajectory, name: str, line: Lum
     low = np.asarray(pieces.low, dtype=float)
     if not low.size or not 2 < rows.t.size <= MOST_ROWS:
         return None
-    ends = [port.name for port in type(system.plan.components[name]).ports() if port.domain is HYDRAULIC][:2]
-    names = [f"{name}.{end}.{v}" for v in ("p", "q") for end in ends]
+    names = _ends(system, name)
     now = system.series(names, *rows.arrays(), p)
     if not np.isfinite(now).all():
         return None
@@ -226,3 +230,54 @@ def _parts(line: LumpedLine) -> str:
 
 def _ms(seconds: float) -> str:
     return f"{1e3 * seconds:.3g} ms"
+
+
+def ringing(system: System, p: Array, trajectory: Trajectory) -> str:
+    r"""What is to be said of a cell below absolute zero while the waves from the line's ends are above; else ''.
+
+    .. math:: p(x, t) = \tfrac12 [(p_a + Z q_a)(t - x/a) + (p_b + Z q_b)(t - (l - x)/a)] \pm \tfrac12 R
+
+    An end sends p + Z q = (p - Z q) + 2 Z q where it is given q, and 2 p - (p - Z q) where it is given p; p - Z q came
+    from the other end, so that what rings in the line is not counted. Friction is taken as if it all lowered p.
+    """
+    match = BELOW_ZERO.search(trajectory.error)
+    line = _lines(system.plan).get(match["line"]) if match else None
+    places = getattr(line, "places", None)
+    if match is None or line is None or places is None or not len(np.asarray(trajectory.pieces.low)):
+        return ""
+    name, rows, fluid = match["line"], trajectory.steps, _fluid(system.plan, match["line"])
+    names = _ends(system, name)
+    now = system.series(names, *rows.arrays(), p)
+    if not np.isfinite(now).all():
+        return ""
+    travel, impedance = _wave(line, float(now[:2].mean()), fluid)
+    share, t = float(places[int(match["node"]) - 1]), float(rows.t[-1])
+    gives = [port.role == "gives" for port in type(system.plan.components[name]).ports() if port.domain is HYDRAULIC][
+        :2
+    ]
+    low = np.asarray(trajectory.pieces.low, dtype=float)
+
+    def leaving(end: int, at: float, reflections: int) -> float:
+        """The wave that leaves an end, from what the end was given there and the wave that came from the other end."""
+        ends = _at(system, p, trajectory, low, names, np.array([max(at, float(rows.t[0]))]))[:, 0]
+        if not reflections or at < rows.t[0]:
+            return float(ends[end] + impedance * ends[end + 2])
+        arriving = leaving(1 - end, at - travel, reflections - 1)
+        return float(arriving + 2 * impedance * ends[end + 2] if gives[end] else 2 * ends[end] - arriving)
+
+    waves = leaving(0, t - share * travel, REFLECTIONS) + leaving(1, t - (1 - share) * travel, REFLECTIONS)
+    lost = float(np.abs(line.friction_drop(now[2:], float(now[:2].mean()), fluid)).max())
+    lowest = waves / 2 - lost
+    if not lowest > -float(fluid.atmospheric_pressure):
+        return ""
+    return (
+        f"the waves from its ends make it at least {pressure.show(lowest, 'bar', 2)} there: {line.lumps} cells "
+        "ring behind a front, so this need be no cavitation; write more cells and a slower change, or type: "
+        "lax_wendroff_line or transmission_line, which carry fronts"
+    )
+
+
+def _ends(system: System, name: str) -> list[str]:
+    """Pressures and flows of a line's ends."""
+    ends = [port.name for port in type(system.plan.components[name]).ports() if port.domain is HYDRAULIC][:2]
+    return [f"{name}.{end}.{v}" for v in ("p", "q") for end in ends]

@@ -116,3 +116,40 @@ def test_waves_of_dalembert_are_no_error(spoiled):
     at_a, at_b = _characteristics(line, fluid, 0.0, impedance, now, before)
     assert np.abs(at_b).max() < 100  # the friction of this thin fluid
     assert np.abs(at_a - (3e4 if spoiled else 0)).max() < 100
+
+
+@pytest.mark.parametrize(("before", "after", "rings"), [(-5, 0, True), (0, -5, False)])
+def test_ringing_of_a_front_is_told_from_cavitation(before, after, rings):
+    """Joukowsky: rho a dv = 12.5 bar. Stopped flow raises the pressure, and until the front is back at the closed end,
+    2 l/a = 2.95 ms later, nothing is below the reservoir's 0 bar. Flow that is drawn at once lowers it by 12.5 bar.
+    """
+    made = circuit(
+        fluid=OIL,
+        components={
+            "res": {"type": "pressure_source", "pressure": "0 bar"},
+            "line": {
+                "type": "distributed_line",
+                "diameter": "10 mm",
+                "length": "2 m",
+                "start_flow": f"{-before} L/min",
+            },
+            "op": {
+                "type": "step",
+                "output_quantity": "flow",
+                "before": f"{before} L/min",
+                "after": f"{after} L/min",
+                "at": "10 ms",
+            },
+            "v": {"type": "signal_flow_source"},
+        },
+        nets={"i": ["res.port", "line.a"], "o": ["line.b", "v.port"], "s": ["op.y", "v.flow"]},
+        simulation={"stop": "25 ms"},
+    )
+    result = made.simulate(check=False)
+    assert result.status == "failed"
+    assert "below absolute zero" in result.trajectory.error
+    assert ("ring behind a front" in result.trajectory.error) == rings
+    if rings:
+        assert result.time[-1] < 10e-3 + 2.95e-3
+        [least] = re.findall(r"make it at least (-?[\d.]+) bar", result.trajectory.error)
+        assert -0.5 < float(least) <= 0  # 0 bar less the friction of 5 L/min, 0.27 bar by Hagen and Poiseuille
