@@ -19,7 +19,6 @@ from .line_walls import LineWall
 from .two_ports import line_series, two_port_of
 from .vapour_cavities import CavityEnd, cavity_end, cavity_events
 
-
 HIGH, ALIKE = 100e5, 0.8
 """Pressure [Pa] at which free air hardly slows waves, and the least share of their speed there told as constant."""
 
@@ -177,8 +176,8 @@ class TransmissionLine(LineWall, Component):
         if slow < ALIKE * fast:
             remarks.append(
                 f"its waves run at {float(self.speed(fluid)):.4g} m/s, the speed at its mean_pressure of "
-                f"{self.mean_pressure / 1e5:.4g} bar, whatever the pressure; in this fluid they run at {slow:.4g} m/s at "
-                f"0 bar and at {fast:.4g} m/s at {high / 1e5:.4g} bar, and gas released along the line is left out; "
+                f"{self.mean_pressure / 1e5:.4g} bar, whatever the pressure; in this fluid they run at {slow:.4g} m/s "
+                f"at 0 bar and at {fast:.4g} m/s at {high / 1e5:.4g} bar, and gas released along the line is left out; "
                 "lax_wendroff_line follows the speed"
             )
         if fluid.cavity_pressure is not None:

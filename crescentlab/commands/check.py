@@ -13,8 +13,8 @@ from crescentlab.causality import Plan
 from crescentlab.circuit import load
 from crescentlab.commands import arguments as shared
 from crescentlab.commands.text import counted, settings, table, wrapped
-from crescentlab.graph import Member, Net
 from crescentlab.fluid import Fluid
+from crescentlab.graph import Member, Net
 from crescentlab.pressures import settings_too_high
 from crescentlab.units import gauge_of
 from crescentlab.yaml_text import Node
