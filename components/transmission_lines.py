@@ -172,7 +172,8 @@ class TransmissionLine(LineWall, Component):
         if fluid is None:
             return []
         remarks, high = [], max(self.mean_pressure, HIGH)
-        slow, fast = (float(self.wave_speed(p, self.diameter, fluid)) for p in (0.0, high))
+        pressures: Any = (0.0, high)
+        slow, fast = (float(self.wave_speed(p, self.diameter, fluid)) for p in pressures)
         if slow < ALIKE * fast:
             remarks.append(
                 f"its waves run at {float(self.speed(fluid)):.4g} m/s, the speed at its mean_pressure of "
