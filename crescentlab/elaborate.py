@@ -46,6 +46,8 @@ class Instance:
     """Of a family, the causal forms that the library of its file has; of another class, itself."""
     places: dict[str, Place | None] = field(default_factory=dict)
     """Where each of its parameters was written, and each start value, as ``start.p``."""
+    written: Node = field(default_factory=lambda: Node({}))
+    """Its own text in the file."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -256,7 +258,7 @@ class _Elaboration:
         places |= {f"start.{name}": child.place for name, child in given.items()}
         written = [*cls.model_fields, *(f"start.{name}" for name in stateful)]
         places |= {name: COMMAND for name in written if f"{full}.{name}" in overrides.used}
-        self.instances[full] = Instance(full, instance, node.place, start, tuple(forms), places)
+        self.instances[full] = Instance(full, instance, node.place, start, tuple(forms), places, node)
 
     def start_fields(self, cls: type[Component]) -> dict[str, float]:
         """The parameters of a class that the circuit's start pressure serves where they are not given."""

@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from building import OIL, circuit
+from crescentlab.components.distributed_lines import DistributedLine
 from crescentlab.components.lax_wendroff import LaxWendroffLine, LaxWendroffLineTakesTakes
 from crescentlab.components.pipes import (
     Pipe,
@@ -18,17 +19,21 @@ from crescentlab.components.pipes import (
 )
 from crescentlab.components.transmission_lines import TransmissionLine
 from crescentlab.components.two_ports import two_port_of
+from refusing import Refusal
 
+from crescentlab import units
 from crescentlab.analysis.doctor import advice, examine
 from crescentlab.analysis.doctor.line_advice import chain
 from crescentlab.analysis.doctor.line_errors import line_errors
 from crescentlab.analysis.doctor.line_models import Ends, own_two_port, scattering_error
+from crescentlab.analysis.doctor.line_text import part_of
 from crescentlab.analysis.linear import linearize
 from crescentlab.analysis.steady import steady
-from crescentlab.circuit import Circuit
+from crescentlab.circuit import Circuit, load
 from crescentlab.commands.doctor import told
 from crescentlab.component import Component
 from crescentlab.fluid import Fluid
+from crescentlab.yaml_text import Node
 
 BETA, RHO, NU = 1.4e9, 860.0, 35e-6
 """Bulk modulus [Pa], density [kg/m^3] and viscosity [m^2/s] of the test's oil."""
@@ -116,12 +121,76 @@ def test_a_coarse_pipe_is_told_and_the_advice_passes() -> None:
     assert any(said.startswith("pipe (pipe) is ") and said.endswith(line.note) for said in advice(found))
     fine = advised(line.note)
     assert fine["type"] == "distributed_line"
-    assert fine["length"] == "1000 mm"
+    assert fine["length"] == "1 m"
     cells = int(str(fine["cells"]))
     assert cells == line.parts
     again = [examine(pulsating({**fine, "cells": str(n)}), line_error=0.1).lines[0] for n in (cells, cells - 1)]
     enough, too_few = (float(each.errors[np.isclose(each.frequencies, 400.0)][0]) for each in again)
     assert enough <= 0.1 < too_few  # the finer line also carries 1200 Hz, which the throttle makes of 400
+
+
+LONG = """crescentlab: 1
+title: Pulsating flow in a long line
+fluid: {type: simple_oil, density: 870 kg/m^3, kinematic_viscosity: 46 cSt, bulk_modulus: 1.6 GPa}
+parameters: {bore: 20 mm, supply: 30 bar}
+components:
+  wave: {type: sine, mean: 20 L/min, amplitude: 2 L/min, frequency: 8 Hz}
+  source: {type: signal_flow_source}
+  line: {LINE}
+  v: {type: capacity, volume: 20 cm^3, start: {p: 23 bar}}
+  hole: {type: throttle, area: 6.5 mm^2}
+  tank: {type: tank}
+nets:
+  asked: [wave.y, source.flow]
+  inlet: [source.port, line.a]
+  outlet: [line.b, v.port, hole.a]
+  out: [hole.b, tank.port]
+simulation: {stop: 2 s, period: 125 ms}
+"""
+"""50 m is 0.29 of a wave of 8 Hz at 1356 m/s."""
+
+
+@pytest.mark.parametrize(
+    ("text", "same", "gone"),
+    [
+        (
+            "type: distributed_line, length: 50 m, diameter: = bore, cells: 1, start_pressure: = supply, "
+            "start_flow: 18.85 L/min",
+            ["length: 50 m", "diameter: = bore", "start_pressure: = supply", "start_flow: 18.85 L/min"],
+            ["cells: 1,"],
+        ),
+        (
+            "type: pipe, length: 5000 cm, diameter: '= max(bore, 1 mm)', start: {p: = supply, q: 18.85 L/min}",
+            ["length: 5000 cm", "diameter: '= max(bore, 1 mm)'", "start_pressure: = supply", "start_flow: 18.85 L/min"],
+            ["start: {"],
+        ),
+    ],
+)  # fmt: skip
+def test_the_line_to_paste_keeps_the_users_text(text: str, same: list[str], gone: list[str], refused: Refusal) -> None:
+    """What the user wrote stands in the advice as written; the file with it in place of the old line passes check."""
+    refused.write({"a.yaml": LONG.replace("LINE", text)})
+    (line,) = examine(load(refused.folder / "a.yaml"), line_error=0.05).lines
+    match = re.fullmatch(r"write \{(.*)\}", line.note)
+    assert match is not None, line.note
+    assert match[1].startswith("type: distributed_line, length: ")
+    assert all(f", {each}" in f", {match[1]}," for each in same)
+    assert not any(each in match[1] for each in gone)
+    assert match[1].count("cells: ") == 1
+    assert set(re.findall(r"(\w+): ", match[1])) <= set(DistributedLine.model_fields) | {"type"}
+    refused.write({"a.yaml": LONG.replace("LINE", match[1])})
+    code, out, _ = refused.run("check", "a.yaml")
+    assert code == 0
+    assert "warning" not in out
+
+
+@pytest.mark.parametrize(
+    ("whole", "part"),
+    [("200 m", "40 m"), ("1 in", "0.2 in"), ("= 2 * bore", "'= (2 * bore) / 5'"), ("1e3 mm", "200 mm")],
+)
+def test_lines_in_series_are_as_long_as_the_user_counts(whole: str, part: str) -> None:
+    """A fifth of the length, in the unit of the whole or as its formula."""
+    length = 0.0 if whole.startswith("=") else units.length.parse(whole)
+    assert part_of(Node(whole), length, 5) == part
 
 
 def test_a_short_pipe_is_let_pass() -> None:

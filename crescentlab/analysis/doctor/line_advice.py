@@ -6,12 +6,13 @@ from collections.abc import Callable, Iterator
 
 import numpy as np
 
-from crescentlab import units
 from crescentlab.analysis.doctor.line_models import Ends, own_two_port, ports_of, scattering_error, tick_limit
-from crescentlab.component import Component, field_quantity
+from crescentlab.analysis.doctor.line_text import family_of, part_of, rewritten
+from crescentlab.component import Component
 from crescentlab.errors import CrescentlabError
 from crescentlab.fluid import Fluid
 from crescentlab.library import Library
+from crescentlab.yaml_text import Node
 
 Array = np.ndarray
 
@@ -24,20 +25,18 @@ CELLS = "cells"
 """Its number N, which is always written."""
 TERMS, MORE_TERMS = "friction_terms", (10, 4)
 """Terms of a line's frequency-dependent friction that are tried if none is not enough."""
-STARTS = ("start_pressure", "start_flow")
-"""Fields of its pressure at a and of its flow at the start."""
 MOST_STATES = 800
 """Of a line that is tried."""
 
 
 def instead_of(
-    form: Component, library: Library, fluid: Fluid, omega: Array, ends: Ends, exact: Array, bound: float
+    form: Component, text: Node, library: Library, fluid: Fluid, omega: Array, ends: Ends, exact: Array, bound: float
 ) -> tuple[str, int | None]:
-    """What to write for a line that is too coarse, and how many cells or lumps it takes."""
+    """What to write for a line that is too coarse and has this text, and how many cells or lumps it takes."""
     ticks = np.isfinite(tick_limit(form, fluid))
     if ticks and (found := _finer(form, fluid, omega, ends, exact, bound)):
         return found
-    if found := _distributed(form, library, fluid, omega, ends, exact, bound):
+    if found := _distributed(form, text, library, fluid, omega, ends, exact, bound):
         return found
     count = None if ticks else _fewest(lambda n: chain(form, n, fluid, omega, ends), 2, MOST_PARTS, exact, bound)
     if count is None:
@@ -48,18 +47,18 @@ def instead_of(
                 None,
             )
         return f"not even {MOST_PARTS} parts meet it: what is missing is no inertia or capacity, but losses", None
-    each = units.length.show(float(getattr(form, "length", 0.0)) / count, "mm")
-    return f"write {count} lines of type {_family(type(form)).type_name()} in series, each {each} long", count
+    each = part_of(text.find(("length",)), float(getattr(form, "length", 0.0)), count)
+    return f"write {count} lines of type {family_of(type(form)).type_name()} in series, each {each} long", count
 
 
 def _distributed(
-    form: Component, library: Library, fluid: Fluid, omega: Array, ends: Ends, exact: Array, bound: float
+    form: Component, text: Node, library: Library, fluid: Fluid, omega: Array, ends: Ends, exact: Array, bound: float
 ) -> tuple[str, int] | None:
     """The library's line of the fewest cells without terms of friction, else of the fewest states with some."""
     found: tuple[str, int] | None = None
     states = MOST_STATES
     for terms in (0, *MORE_TERMS):
-        make, each = _cells_of(form, library, terms, ends), 2 + terms
+        make, each = _cells_of(form, library, terms), 2 + terms
         if make is None:
             continue
 
@@ -70,7 +69,10 @@ def _distributed(
         if most and _meets(cells(most), exact, bound):
             count = _fewest(cells, 1, most, exact, bound)
             assert count is not None
-            found, states = (f"write {_written(make(count))}", count), count * each - 1
+            found, states = (
+                (f"write {rewritten(text, type(form), make(count), _changes(count, terms))}", count),
+                count * each - 1,
+            )
         if (found is None) == (terms > 0):
             break  # what fails with many terms fails with fewer; where none passes, none is needed
     return found
@@ -99,17 +101,9 @@ def _finer(
     return None
 
 
-def _written(line: Component) -> str:
-    """A line as it is written in a circuit; what has its default is left out."""
-    said = [f"type: {_family(type(line)).type_name()}"]
-    for name, field in type(line).model_fields.items():
-        value, quantity = getattr(line, name), field_quantity(field)
-        if value is None or (value == field.default and name != CELLS):
-            continue
-        digits = 3 if name in STARTS else 6
-        shown = value if quantity is None else quantity.show(float(value), next(iter(quantity.units)), digits)
-        said.append(f"{name}: {shown}")
-    return f"{{{', '.join(said)}}}"
+def _changes(count: int, terms: int) -> dict[str, str]:
+    """What the library's line of so many cells and terms of friction says of its own."""
+    return {CELLS: str(count)} | ({TERMS: str(terms)} if terms else {})
 
 
 def _meets(own: Array | None, exact: Array, bound: float) -> bool:
@@ -129,11 +123,8 @@ def _fewest(model: Callable[[int], Array | None], first: int, most: int, exact: 
     return high
 
 
-def _cells_of(form: Component, library: Library, terms: int, ends: Ends) -> Callable[[int], Component] | None:
-    """Makes the library's distributed line of n cells in place of a line, its ends as the line's; None without one.
-
-    It starts from the means of the run, as the line it stands for may start from states that it does not have.
-    """
+def _cells_of(form: Component, library: Library, terms: int) -> Callable[[int], Component] | None:
+    """Makes the library's distributed line of n cells in place of a line, its ends as the line's; None without one."""
     cls = library.components.get(INSTEAD)
     if cls is None:
         return None
@@ -142,7 +133,6 @@ def _cells_of(form: Component, library: Library, terms: int, ends: Ends) -> Call
     if not forms or CELLS not in cls.model_fields:
         return None
     given = {n: getattr(form, n) for n in cls.model_fields if n in type(form).model_fields}
-    given |= {n: v for n, v in zip(STARTS, (ends.p_a, ends.q), strict=True) if n in cls.model_fields}
     if terms:
         if TERMS not in cls.model_fields:
             return None
@@ -178,16 +168,11 @@ def chain(form: Component, count: int, fluid: Fluid, omega: Array, ends: Ends) -
 def _forms_in_series(form: Component, count: int) -> Iterator[type[Component]]:
     """Forms whose neighbours fit: where one takes the pressure the next gives it."""
     ends = ports_of(form)
-    family = {tuple(str(p.role) for p in f.ports() if p.name in ends): f for f in _family(type(form)).forms()}
+    family = {tuple(str(p.role) for p in f.ports() if p.name in ends): f for f in family_of(type(form)).forms()}
     a, b = (str(p.role) for p in type(form).ports() if p.name in ends)
     inner = {("takes", "takes"): ("gives", "takes"), ("gives", "gives"): ("takes", "gives")}.get((a, b), (a, b))
     for k in range(count):
         yield family[(a, b) if k == 0 else inner]
-
-
-def _family(cls: type[Component]) -> type[Component]:
-    """The class that the circuit names, of which this is a causal form."""
-    return next((c for c in cls.__mro__ if issubclass(c, Component) and c.family), cls)
 
 
 def _chain_matrix(y: Array) -> Array:

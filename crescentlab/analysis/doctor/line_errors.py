@@ -16,6 +16,7 @@ from crescentlab.analysis.linear.two_ports import TwoPort
 from crescentlab.analysis.spectrum import spectra
 from crescentlab.analysis.spectrum.dense import Dense
 from crescentlab.component import Component
+from crescentlab.elaborate import Instance
 from crescentlab.fluid import Fluid
 from crescentlab.library import Library
 from crescentlab.result import Result
@@ -72,15 +73,15 @@ def line_errors(result: Result, library: Library, period: float | None, bound: f
             continue
         fluid = result.design.fluids[result.system.plan.fluids[name]["fluid"]]
         form = _form(type(result.system.plan.components[name]), part)
-        found.append(_judged(name, form, part, library, fluid, frequencies, ends, bound))
+        found.append(_judged(instance, form, library, fluid, frequencies, ends, bound))
     return found
 
 
 def _judged(
-    name: str, form: Component, part: Component, library: Library, fluid: Fluid, frequencies: Array, ends: Ends,
-    bound: float,
-) -> LineError:  # fmt: skip
+    instance: Instance, form: Component, library: Library, fluid: Fluid, frequencies: Array, ends: Ends, bound: float
+) -> LineError:
     """One line against its exact law."""
+    name, part = instance.name, instance.component
     assert isinstance(part, TwoPort)
     kind, nothing = type(part).type_name(), np.zeros(0)
     limit = tick_limit(form, fluid) / (2 * np.pi)
@@ -98,7 +99,7 @@ def _judged(
     errors = scattering_error(own, exact)
     note, parts = "", None
     if errors.max() > bound:
-        note, parts = instead_of(form, library, fluid, omega, ends, exact, bound)
+        note, parts = instead_of(form, instance.written, library, fluid, omega, ends, exact, bound)
     return LineError(name, kind, frequencies, errors, bound, note, parts, above)
 
 
