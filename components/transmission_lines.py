@@ -172,13 +172,8 @@ class TransmissionLine(LineWall, Component):
         if fluid is None:
             return []
         remarks, high = [], max(self.mean_pressure, HIGH)
-<<<<<<< HEAD
-        ends: tuple[Any, Any] = (0.0, high)
-        slow, fast = (float(self.wave_speed(p, self.diameter, fluid)) for p in ends)
-=======
         pressures: Any = (0.0, high)
         slow, fast = (float(self.wave_speed(p, self.diameter, fluid)) for p in pressures)
->>>>>>> signals
         if slow < ALIKE * fast:
             remarks.append(
                 f"its waves run at {float(self.speed(fluid)):.4g} m/s, the speed at its mean_pressure of "
