@@ -329,7 +329,8 @@ class _CompiledRun:
             return
         if self.run_.steps >= self.chatter_at:
             self.chatter_at *= 2
-            self.chattering = self.chattering or self.chatter.look(*self.records.last(ROWS))
+            left = self.options.stop - self.run_.t
+            self.chattering = self.chattering or self.chatter.look(*self.records.last(ROWS), left)
 
     # -- failures --------------------------------------------------------------------------------
 
@@ -359,7 +360,7 @@ class _CompiledRun:
         if code == "IMPOSSIBLE_HELD":
             self.limits.check(t, x, hybrid.h)
         self.diagnosis.check_finite(t, x, self.diagnosis.functions.rhs(t, x))
-        reason = self.chatter.look(*self.records.last(ROWS), throughout=False) or self.diagnosis.blame(t, x)
+        reason = self.chatter.look(*self.records.last(ROWS)) or self.diagnosis.blame(t, x)
         raise SimulationError(f"no step is small enough; {reason}")
 
     def fail_full(self) -> NoReturn:

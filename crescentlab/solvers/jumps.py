@@ -22,6 +22,8 @@ ROWS = 200
 """Accepted steps that are looked at, and ..."""
 FEWEST = 3
 """... the fewest that tell anything."""
+CREEP = 1e5
+"""Steps ahead at the present pace beyond which a run creeps; others are not looked at, which takes a while once."""
 NEAR = 3.0
 """A run that creeps along a boundary stays within so many of its steps of it."""
 ROUNDOFF = 1e-11
@@ -115,16 +117,18 @@ class Chatter:
         made: Choices = self.system.once("choices", lambda: Choices(self.system))
         return made
 
-    def look(self, t: Array, x: Array, h: Array, b: Array, *, throughout: bool = True) -> str | None:
+    def look(self, t: Array, x: Array, h: Array, b: Array, left: float | None = None) -> str | None:
         """A sentence if a run creeps along the boundary of a choice both of whose branches push back to it.
 
-        Rows of the run's last steps: times (m,), states (m, n), held values (m, k), bits (m, r). The run must have been
-        at that boundary ``throughout`` them, or is at its last row.
+        Rows of the run's last steps: times (m,), states (m, n), held values (m, k), bits (m, r). With time ``left`` [s]
+        the run must have been at that boundary throughout them, and have a creep ahead; without, it is at its last row.
         """
-        if t.size < FEWEST or not self.choices.names:
+        if t.size < FEWEST:
             return None
         step = float(t[-1] - t[0]) / (t.size - 1)
-        rows = (0, t.size // 2, t.size - 1) if throughout else (t.size - 1,)
+        if (left is not None and left < CREEP * step) or not self.choices.names:
+            return None
+        rows = (t.size - 1,) if left is None else (0, t.size // 2, t.size - 1)
         both = [set(self.pushed_back(float(t[k]), x[k], h[k], b[k], step)) for k in rows]
         for k in set.intersection(*both):
             return (

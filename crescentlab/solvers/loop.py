@@ -365,18 +365,19 @@ class _Run:
 
     def blame(self, t: float, x: np.ndarray) -> str:
         """What keeps steps from being long enough."""
-        return self.chatter.look(*self.last_rows, throughout=False) or self.diagnosis.blame(t, x)
+        return self.chatter.look(*self.last_rows) or self.diagnosis.blame(t, x)
 
     @property
-    def last_rows(self) -> list[np.ndarray]:
+    def last_rows(self) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
         """Times, states, held values, bits of the last steps."""
-        return [np.array(rows[-ROWS:]) for rows in (self.steps.t, self.steps.x, self.steps.h, self.steps.b)]
+        s = self.steps
+        return np.array(s.t[-ROWS:]), np.array(s.x[-ROWS:]), np.array(s.h[-ROWS:]), np.array(s.b[-ROWS:])
 
     def check_chatter(self) -> None:
         """Look, each time the steps have doubled, whether a choice without an event chatters."""
         if self.statistics.steps >= self.chatter_at:
             self.chatter_at *= 2
-            if chatter := self.chatter.look(*self.last_rows):
+            if chatter := self.chatter.look(*self.last_rows, self.options.stop - self.now()):
                 raise SimulationError(chatter)
 
     def check_pressures(self, low: float, end: float, x_high: np.ndarray) -> None:
